@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: The LightTransport authors
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# What the root CMakeLists.txt calls: build defaults, finding VTK, building the modules.
+
+macro (lighttransport_set_build_defaults)
+  if (NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+    set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+  endif ()
+  set(CMAKE_CXX_STANDARD 17)
+  set(CMAKE_CXX_STANDARD_REQUIRED ON)
+  set(CMAKE_CXX_EXTENSIONS OFF)
+  set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+  set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+  set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+  set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_BINDIR}")
+  set(CMAKE_LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR}")
+  set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR}")
+  find_program(CCACHE_PROGRAM ccache)
+  mark_as_advanced(CCACHE_PROGRAM)
+  if (CCACHE_PROGRAM)
+    set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+  endif ()
+endmacro ()
+
+# The components are named because Debian's VTK without them asks for Qt.
+macro (lighttransport_find_vtk)
+  set(lighttransport_vtk_components
+    CommonCore CommonDataModel CommonExecutionModel CommonMath CommonSystem CommonTransforms
+    FiltersCore FiltersSources ImagingCore
+    RenderingCore RenderingOpenGL2 RenderingVolume RenderingVolumeOpenGL2
+    RenderingAnnotation RenderingFreeType InteractionStyle IOImage IOXML glew opengl)
+  if (LIGHTTRANSPORT_WRAP_PYTHON)
+    list(APPEND lighttransport_vtk_components WrappingPythonCore Python)
+    # A python of the user's own in PATH has no vtkmodules; the system's has.
+    if (NOT Python3_EXECUTABLE AND EXISTS /usr/bin/python3)
+      set(Python3_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "Python with VTK's modules")
+    endif ()
+  endif ()
+  if (LIGHTTRANSPORT_BUILD_TESTING)
+    list(APPEND lighttransport_vtk_components TestingCore TestingRendering)
+  endif ()
+  find_package(VTK 9.1 REQUIRED COMPONENTS ${lighttransport_vtk_components})
+endmacro ()
+
+function (lighttransport_compile_options)
+  if (CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
+    add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Wall> $<$<COMPILE_LANGUAGE:CXX>:-Wextra>)
+    if (LIGHTTRANSPORT_WARNINGS_AS_ERRORS)
+      add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Werror>)
+    endif ()
+  endif ()
+endfunction ()
+
+# A function, so that CMAKE_BINARY_DIR and the re-entry flag change here alone:
+# vtk_module_build puts a module in its folder below CMAKE_BINARY_DIR, and the
+# umbrella's would be the build folder itself.
+function (lighttransport_build_modules)
+  vtk_module_scan(
+    MODULE_FILES ${ARGN}
+    REQUEST_MODULES LightTransport::LightTransport
+    PROVIDES_MODULES lighttransport_modules
+    ENABLE_TESTS OFF)
+  set(LIGHTTRANSPORT_REENTERED ON)
+  set(lighttransport_top_binary_dir "${CMAKE_BINARY_DIR}")
+  set(CMAKE_BINARY_DIR "${CMAKE_BINARY_DIR}/modules")
+  set(LIGHTTRANSPORT_HEADERS_DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/lighttransport")
+  vtk_module_build(
+    MODULES ${lighttransport_modules}
+    PACKAGE LightTransport
+    INSTALL_EXPORT LightTransport
+    LIBRARY_NAME_SUFFIX ""
+    VERSION "${LightTransport_VERSION}"
+    SOVERSION "${LightTransport_VERSION_MAJOR}"
+    HEADERS_DESTINATION "${LIGHTTRANSPORT_HEADERS_DESTINATION}"
+    CMAKE_DESTINATION "${CMAKE_INSTALL_LIBDIR}/cmake/LightTransport"
+    INSTALL_HEADERS ON)
+  set(lighttransport_modules "${lighttransport_modules}" PARENT_SCOPE)
+  if (LIGHTTRANSPORT_WRAP_PYTHON)
+    set(CMAKE_BINARY_DIR "${lighttransport_top_binary_dir}")
+    vtk_module_wrap_python(
+      MODULES ${lighttransport_modules}
+      TARGET LightTransport::Python
+      PYTHON_PACKAGE "lighttransport"
+      CMAKE_DESTINATION "${CMAKE_INSTALL_LIBDIR}/cmake/LightTransport"
+      SOABI "${Python3_SOABI}"
+      BUILD_STATIC OFF)
+  endif ()
+endfunction ()

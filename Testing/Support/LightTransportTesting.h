@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * What every test needs and no VTK: checks that collect failures, so that all
+ * sub-cases run and then fail together, and the command line.
+ *
+ *   int main(int argc, char* argv[])
+ *   {
+ *     lighttransport::testing::Suite suite(argc, argv);
+ *     LT_CHECK(suite, 1 + 1 == 2);
+ *     LT_CHECK_NEAR(suite, std::sqrt(2.), 1.4142, 1e-4);
+ *     return suite.result();
+ *   }
+ */
+#ifndef LightTransportTesting_h
+#define LightTransportTesting_h
+
+#include <cfenv>
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+namespace lighttransport
+{
+namespace testing
+{
+class Suite
+{
+public:
+  Suite(int argc, char* argv[])
+  {
+    for (int i = 1; i + 1 < argc; ++i)
+    {
+      const std::string option = argv[i];
+      if (option == "-T")
+      {
+        this->temporary = argv[++i];
+      }
+      else if (option == "-B")
+      {
+        this->baselines = argv[++i];
+      }
+      else if (option == "-D")
+      {
+        this->data = argv[++i];
+      }
+    }
+  }
+
+  std::string temporary = ".";
+  std::string baselines = ".";
+  std::string data;
+
+  /** Numerics run with floating-point exceptions on: a NaN traps where it is born. */
+  static void trapFloatingPoint()
+  {
+#if defined(__GLIBC__)
+    feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
+#endif
+  }
+
+  /** True where the optional file of the shared data exists; else say so. */
+  bool hasData(const std::string& name) const
+  {
+    if (!this->data.empty() && std::ifstream(this->data + "/" + name).good())
+    {
+      return true;
+    }
+    std::cout << "no " << name << " here: skipped\n";
+    return false;
+  }
+
+  void check(bool ok, const std::string& what, const char* file, int line)
+  {
+    ++this->checks;
+    if (!ok)
+    {
+      ++this->failures;
+      std::cout << file << ":" << line << ": failed: " << what << "\n";
+    }
+  }
+
+  int result() const
+  {
+    std::cout << this->checks << " checks, " << this->failures << " failures\n";
+    return this->failures == 0 && this->checks > 0 ? 0 : 1;
+  }
+  static int skipped() { return 125; }
+
+private:
+  int checks = 0;
+  int failures = 0;
+};
+} // namespace testing
+} // namespace lighttransport
+
+#define LT_CHECK(suite, condition) (suite).check((condition), #condition, __FILE__, __LINE__)
+
+/** |value - expected| <= tolerance; a NaN fails. */
+#define LT_CHECK_NEAR(suite, value, expected, tolerance)                                           \
+  (suite).check(std::abs((value) - (expected)) <= (tolerance),                                     \
+    std::string(#value " = ") + std::to_string(value) + ", expected " + std::to_string(expected) + \
+      " +- " + std::to_string(tolerance),                                                          \
+    __FILE__, __LINE__)
+
+/** |value - expected| <= tolerance * |expected|; a NaN fails. */
+#define LT_CHECK_CLOSE(suite, value, expected, tolerance)                                          \
+  LT_CHECK_NEAR(suite, value, expected, (tolerance)*std::abs(expected))
+
+#endif
