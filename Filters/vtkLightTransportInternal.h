@@ -13,7 +13,8 @@
 /** The kernels' parallel-for, on vtkSMPTools. */
 inline lighttransport::ParallelFor vtkLightTransportParallelFor()
 {
-  return [](std::int64_t n, const lighttransport::RangeBody& body) {
+  return [](std::int64_t n, const lighttransport::RangeBody& body)
+  {
     auto range = [&body](vtkIdType begin, vtkIdType end) { body(begin, end); };
     vtkSMPTools::For(0, n, range);
   };

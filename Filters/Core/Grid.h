@@ -18,10 +18,7 @@ struct Grid
   std::array<int, 3> dims{ { 0, 0, 0 } };
   std::array<double, 3> spacing{ { 1., 1., 1. } };
 
-  std::int64_t size() const
-  {
-    return static_cast<std::int64_t>(dims[0]) * dims[1] * dims[2];
-  }
+  std::int64_t size() const { return static_cast<std::int64_t>(dims[0]) * dims[1] * dims[2]; }
   std::int64_t index(int i, int j, int k) const
   {
     return i + dims[0] * (j + static_cast<std::int64_t>(dims[1]) * k);

@@ -31,6 +31,8 @@ macro (lighttransport_find_vtk)
     FiltersCore FiltersSources ImagingCore
     RenderingCore RenderingOpenGL2 RenderingVolume RenderingVolumeOpenGL2
     RenderingAnnotation RenderingFreeType InteractionStyle IOImage IOXML glew opengl)
+  # What the modules alone use is what LightTransportConfig.cmake asks of a user's VTK.
+  set(lighttransport_vtk_public_components ${lighttransport_vtk_components})
   if (LIGHTTRANSPORT_WRAP_PYTHON)
     list(APPEND lighttransport_vtk_components WrappingPythonCore Python)
     # A python of the user's own in PATH has no vtkmodules; the system's has.
@@ -45,11 +47,26 @@ macro (lighttransport_find_vtk)
 endmacro ()
 
 function (lighttransport_compile_options)
-  if (CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
-    add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Wall> $<$<COMPILE_LANGUAGE:CXX>:-Wextra>)
-    if (LIGHTTRANSPORT_WARNINGS_AS_ERRORS)
-      add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Werror>)
+  if (NOT CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
+    return ()
+  endif ()
+  add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Wall> $<$<COMPILE_LANGUAGE:CXX>:-Wextra>)
+  if (LIGHTTRANSPORT_WARNINGS_AS_ERRORS)
+    add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-Werror>)
+  endif ()
+  if (LIGHTTRANSPORT_SANITIZE)
+    if (LIGHTTRANSPORT_WRAP_PYTHON)
+      message(FATAL_ERROR "LIGHTTRANSPORT_SANITIZE=${LIGHTTRANSPORT_SANITIZE} needs "
+        "LIGHTTRANSPORT_WRAP_PYTHON=OFF: python itself is not instrumented")
     endif ()
+    # vptr needs the type information of VTK's classes, which are built without.
+    string(REPLACE ";" "," sanitizers "${LIGHTTRANSPORT_SANITIZE}")
+    set(flags -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    if ("undefined" IN_LIST LIGHTTRANSPORT_SANITIZE)
+      list(APPEND flags -fno-sanitize=vptr)
+    endif ()
+    add_compile_options(${flags} -g1)
+    add_link_options(${flags})
   endif ()
 endfunction ()
 
@@ -84,7 +101,46 @@ function (lighttransport_build_modules)
       TARGET LightTransport::Python
       PYTHON_PACKAGE "lighttransport"
       CMAKE_DESTINATION "${CMAKE_INSTALL_LIBDIR}/cmake/LightTransport"
+      LIBRARY_DESTINATION "${CMAKE_INSTALL_LIBDIR}"
       SOABI "${Python3_SOABI}"
       BUILD_STATIC OFF)
+    lighttransport_python_package()
   endif ()
+endfunction ()
+
+# Our own __init__.py beside the wrapped modules, in the build tree and the install.
+function (lighttransport_python_package)
+  vtk_module_python_default_destination(destination)
+  set(source "${CMAKE_SOURCE_DIR}/Module/Python/__init__.py")
+  set(built "${CMAKE_BINARY_DIR}/${destination}/lighttransport/__init__.py")
+  add_custom_command(
+    OUTPUT "${built}"
+    COMMAND "${CMAKE_COMMAND}" -E copy "${source}" "${built}"
+    DEPENDS "${source}"
+    COMMENT "Copying the Python package")
+  add_custom_target(lighttransport_python ALL DEPENDS "${built}")
+  install(FILES "${source}" DESTINATION "${destination}/lighttransport" COMPONENT python)
+  set(LIGHTTRANSPORT_PYTHONPATH "${CMAKE_BINARY_DIR}/${destination}"
+    CACHE INTERNAL "PYTHONPATH of the build tree")
+  set(LIGHTTRANSPORT_PYTHON_DESTINATION "${destination}"
+    CACHE INTERNAL "The same below an installation's prefix")
+endfunction ()
+
+# What find_package(LightTransport) reads in an installation.
+function (lighttransport_install_config)
+  include(CMakePackageConfigHelpers)
+  set(destination "${CMAKE_INSTALL_LIBDIR}/cmake/LightTransport")
+  configure_package_config_file(
+    "${CMAKE_CURRENT_SOURCE_DIR}/Module/CMake/LightTransportConfig.cmake.in"
+    "${CMAKE_CURRENT_BINARY_DIR}/LightTransportConfig.cmake"
+    INSTALL_DESTINATION "${destination}")
+  write_basic_package_version_file(
+    "${CMAKE_CURRENT_BINARY_DIR}/LightTransportConfigVersion.cmake"
+    VERSION "${LightTransport_VERSION}" COMPATIBILITY SameMinorVersion)
+  install(FILES
+    "${CMAKE_CURRENT_BINARY_DIR}/LightTransportConfig.cmake"
+    "${CMAKE_CURRENT_BINARY_DIR}/LightTransportConfigVersion.cmake"
+    DESTINATION "${destination}" COMPONENT development)
+  install(FILES LICENSE README.md
+    DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/lighttransport" COMPONENT runtime)
 endfunction ()

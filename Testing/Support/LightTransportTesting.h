@@ -86,7 +86,10 @@ public:
     std::cout << this->checks << " checks, " << this->failures << " failures\n";
     return this->failures == 0 && this->checks > 0 ? 0 : 1;
   }
-  static int skipped() { return 125; }
+  static int skipped()
+  {
+    return 125;
+  }
 
 private:
   int checks = 0;
