@@ -397,16 +397,18 @@ vtkStandardNewMacro(vtkLightTransportEGLRenderWindow);
 //------------------------------------------------------------------------------
 bool vtkLightTransportEGLRenderWindow::UseIfHeadless()
 {
+#if !defined(_WIN32) && !defined(__APPLE__) // there VTK's windows need no X
   const char* display = std::getenv("DISPLAY");
   if (!display || !*display)
   {
-    return vtkLightTransportEGLRenderWindow::UseAlways();
+    return vtkLightTransportEGLRenderWindow::UseForAllWindows();
   }
+#endif
   return TheFactory != nullptr;
 }
 
 //------------------------------------------------------------------------------
-bool vtkLightTransportEGLRenderWindow::UseAlways()
+bool vtkLightTransportEGLRenderWindow::UseForAllWindows()
 {
   if (!TheFactory)
   {

@@ -56,11 +56,11 @@ public:
    * harmless to repeat; touches no EGL.
    */
   static bool UseIfHeadless();
-  static bool UseAlways();
+  static bool UseForAllWindows();
   ///@}
 
   /**
-   * Undo UseIfHeadless() or UseAlways() for windows created from now on.
+   * Undo UseIfHeadless() or UseForAllWindows() for windows created from now on.
    */
   static void StopUsing();
 

@@ -15,8 +15,6 @@ renders says why it is missing.
 """
 
 import importlib as _importlib
-import os as _os
-import sys as _sys
 
 _rendering_error = None
 
@@ -53,21 +51,17 @@ def __getattr__(name):
     raise AttributeError(f"module 'lighttransport' has no attribute '{name}'")
 
 
-def _has_display():
-    return bool(_os.environ.get("DISPLAY")) or _sys.platform in ("win32", "darwin")
-
-
 def use_egl():
     """Makes every vtkRenderWindow that is created from now on render through EGL.
 
-    Called by the import when there is no DISPLAY. Returns whether EGL is there;
-    where it is not, a render window tells so when it is asked to render.
+    For a process that has a DISPLAY and wants none; without a DISPLAY the import
+    has done it. Returns whether EGL is there; where it is not, a render window
+    tells so when it is asked to render.
     """
     window = globals().get("vtkLightTransportEGLRenderWindow")
-    return window is not None and bool(window.UseForAllWindows())
+    return window is not None and window.UseForAllWindows() and window.IsAvailable()
 
 
 if _rendering_error is None:
     __version__ = globals()["vtkLightTransportVersion"].GetLightTransportVersion()
-    if not _has_display():
-        use_egl()
+    globals()["vtkLightTransportEGLRenderWindow"].UseIfHeadless()

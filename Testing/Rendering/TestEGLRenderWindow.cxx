@@ -230,7 +230,7 @@ void testCorners(Suite& suite)
     vtkSmartPointer<vtkRenderWindow> window = vtkSmartPointer<vtkRenderWindow>::New();
     LT_CHECK(suite, !window->IsA("vtkLightTransportEGLRenderWindow"));
   }
-  LT_CHECK(suite, vtkLightTransportEGLRenderWindow::UseAlways());
+  LT_CHECK(suite, vtkLightTransportEGLRenderWindow::UseForAllWindows());
   LT_CHECK(suite, vtkLightTransportEGLRenderWindow::UseIfHeadless());
 }
 
@@ -286,7 +286,7 @@ int main(int argc, char* argv[])
   {
     return Suite::skipped();
   }
-  vtkLightTransportEGLRenderWindow::UseAlways();
+  vtkLightTransportEGLRenderWindow::UseForAllWindows();
   LT_CHECK(suite, vtkLightTransportEGLRenderWindow::GetReasonUnavailable().empty());
   testDrawing(suite);
   testTwoWindows(suite);
