@@ -19,7 +19,7 @@ window.AddRenderer(renderer)
 window.SetSize(20, 10)
 window.Render()
 pixels = vtkUnsignedCharArray()
-window.GetPixelData(0, 0, 19, 9, 1, pixels)
+window.GetPixelData(0, 0, 19, 9, 1, pixels, 0)
 print(window.GetClassName(), pixels.GetTuple(0), pixels.GetNumberOfTuples())
 print(lighttransport.vtkLightTransportEGLRenderWindow.IsAvailable())
 """
