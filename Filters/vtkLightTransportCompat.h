@@ -13,4 +13,26 @@
 #define LIGHTTRANSPORT_VTK_AT_LEAST(major, minor)                                                  \
   (VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(major, minor, 0))
 
+/**
+ * The header that brings OpenGL's names: GLEW until 9.3, glad from 9.4 on. Before
+ * any other OpenGL header: #include LIGHTTRANSPORT_GL_HEADER. Can go, for
+ * "vtk_glad.h", when 9.3 is no longer supported.
+ */
+#if LIGHTTRANSPORT_VTK_AT_LEAST(9, 4)
+#define LIGHTTRANSPORT_GL_HEADER "vtk_glad.h"
+#else
+#define LIGHTTRANSPORT_GL_HEADER "vtk_glew.h"
+#endif
+
+/**
+ * Whether an overridden method of vtkObjectFactory is const: a choice of VTK's
+ * build from 9.5 on (VTK_FUTURE_CONST, of vtkObjectFactory.h). Can go when 9.4 is
+ * no longer supported.
+ */
+#if LIGHTTRANSPORT_VTK_AT_LEAST(9, 5)
+#define LIGHTTRANSPORT_FACTORY_CONST VTK_FUTURE_CONST
+#else
+#define LIGHTTRANSPORT_FACTORY_CONST
+#endif
+
 #endif

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "vtk_glew.h" // must come before any other OpenGL header
+#include "vtkLightTransportCompat.h"
+// The line above and the next must come before any other OpenGL header.
+#include LIGHTTRANSPORT_GL_HEADER
 
 #include "vtkLightTransportEGLRenderWindow.h"
 
@@ -366,8 +368,14 @@ class vtkHeadlessFactory : public vtkObjectFactory
 public:
   static vtkHeadlessFactory* New();
   vtkTypeMacro(vtkHeadlessFactory, vtkObjectFactory);
-  const char* GetVTKSourceVersion() override { return VTK_SOURCE_VERSION; }
-  const char* GetDescription() override { return "LightTransport: windows without a display"; }
+  const char* GetVTKSourceVersion() LIGHTTRANSPORT_FACTORY_CONST override
+  {
+    return VTK_SOURCE_VERSION;
+  }
+  const char* GetDescription() LIGHTTRANSPORT_FACTORY_CONST override
+  {
+    return "LightTransport: windows without a display";
+  }
 
 protected:
   vtkHeadlessFactory()
@@ -525,6 +533,14 @@ void vtkLightTransportEGLRenderWindow::DestroyWindow()
 //------------------------------------------------------------------------------
 void vtkLightTransportEGLRenderWindow::OpenGLInitContext()
 {
+#if LIGHTTRANSPORT_VTK_AT_LEAST(9, 4)
+  // glad loads through a function that it is given.
+#ifdef LIGHTTRANSPORT_HAS_EGL
+  this->SetOpenGLSymbolLoader(
+    [](void*, const char* name) -> VTKOpenGLAPIProc { return eglGetProcAddress(name); }, nullptr);
+#endif
+  this->Superclass::OpenGLInitContext();
+#else
   this->ContextCreationTime.Modified();
   if (this->Initialized)
   {
@@ -532,7 +548,6 @@ void vtkLightTransportEGLRenderWindow::OpenGLInitContext()
   }
   // glewInit loads OpenGL, then looks for GLX and returns 4
   // (GLEW_ERROR_NO_GLX_DISPLAY), for there is no X: all that VTK needs is loaded.
-  // VTK 9.4 left GLEW for glad; its own EGL window can take over there.
   const GLenum noGLXDisplay = 4;
   glewExperimental = GL_TRUE;
   const GLenum result = glewInit();
@@ -549,6 +564,7 @@ void vtkLightTransportEGLRenderWindow::OpenGLInitContext()
   glGetFloatv(
     this->LineSmoothing ? GL_SMOOTH_LINE_WIDTH_RANGE : GL_ALIASED_LINE_WIDTH_RANGE, range);
   this->MaximumHardwareLineWidth = range[1];
+#endif
 }
 
 //------------------------------------------------------------------------------
