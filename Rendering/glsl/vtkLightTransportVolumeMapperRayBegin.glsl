@@ -1,0 +1,7 @@
+
+// Class:   vtkLightTransportVolumeMapper    Part: ray begins    Stage: fragment
+// Tag:     VTK::Shading::Init, after it.
+#if LT_BLEND == 2 || LT_BLEND == 3
+g_ltProjected = ltFieldValue(0.0);
+g_ltProjectedMagnitude = 0.0;
+#endif

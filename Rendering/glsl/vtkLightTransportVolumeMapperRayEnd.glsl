@@ -1,0 +1,6 @@
+
+// Class:   vtkLightTransportVolumeMapper    Part: ray ends    Stage: fragment
+// Tag:     VTK::Shading::Exit, after it; g_fragColor is the projection.
+#if LT_BLEND == 2 || LT_BLEND == 3
+g_fragColor = ltComposeProjection(g_fragColor);
+#endif
