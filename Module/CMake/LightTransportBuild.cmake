@@ -30,7 +30,7 @@ macro (lighttransport_find_vtk)
     CommonCore CommonDataModel CommonExecutionModel CommonMath CommonSystem CommonTransforms
     FiltersCore FiltersSources ImagingCore
     RenderingCore RenderingOpenGL2 RenderingVolume RenderingVolumeOpenGL2
-    RenderingAnnotation RenderingFreeType InteractionStyle IOImage IOXML opengl)
+    RenderingAnnotation RenderingFreeType InteractionStyle IOImage IOXML)
   # What the modules alone use is what LightTransportConfig.cmake asks of a user's VTK.
   set(lighttransport_vtk_public_components ${lighttransport_vtk_components})
   if (LIGHTTRANSPORT_WRAP_PYTHON)
@@ -43,9 +43,9 @@ macro (lighttransport_find_vtk)
   if (LIGHTTRANSPORT_BUILD_TESTING)
     list(APPEND lighttransport_vtk_components TestingCore TestingRendering)
   endif ()
-  # glew until VTK 9.3, glad from 9.4 on.
+  # glew and opengl until VTK 9.3, glad from 9.4 on.
   find_package(VTK 9.1 REQUIRED COMPONENTS ${lighttransport_vtk_components}
-    OPTIONAL_COMPONENTS glew glad)
+    OPTIONAL_COMPONENTS glad glew opengl)
 endmacro ()
 
 function (lighttransport_compile_options)
