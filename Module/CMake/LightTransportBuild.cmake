@@ -17,6 +17,12 @@ macro (lighttransport_set_build_defaults)
   set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_BINDIR}")
   set(CMAKE_LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR}")
   set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR}")
+  # An installation may be moved: libraries and programs look beside themselves.
+  if (NOT CMAKE_INSTALL_RPATH AND UNIX AND NOT APPLE)
+    file(RELATIVE_PATH lighttransport_bin_to_lib
+      "/prefix/${CMAKE_INSTALL_BINDIR}" "/prefix/${CMAKE_INSTALL_LIBDIR}")
+    set(CMAKE_INSTALL_RPATH "$ORIGIN" "$ORIGIN/${lighttransport_bin_to_lib}")
+  endif ()
   find_program(CCACHE_PROGRAM ccache)
   mark_as_advanced(CCACHE_PROGRAM)
   if (CCACHE_PROGRAM)

@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
 // Class:   vtkLightTransportVolumeMapper    Part: declarations    Stage: fragment
 // Tag:     VTK::ComputeLighting::Dec, before it.
 // Needs:   LT_MODE (0 Overlay, 1 Illuminate, 2 FluxDirection), LT_BLEND (0 composite

@@ -1,4 +1,6 @@
 
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
 // Class:   vtkLightTransportVolumeMapper    Part: ray begins    Stage: fragment
 // Tag:     VTK::Shading::Init, after it.
 #if LT_BLEND == 2 || LT_BLEND == 3

@@ -1,4 +1,6 @@
 
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
 // Class:   vtkLightTransportVolumeMapper    Part: after a sample    Stage: fragment
 // Tag:     VTK::Shading::Impl, after it, inside the loop along the ray.
 // Needs:   the part before the sample; g_dataPos is still the sample's place.

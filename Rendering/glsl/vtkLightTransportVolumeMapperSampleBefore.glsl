@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
 // Class:   vtkLightTransportVolumeMapper    Part: before a sample    Stage: fragment
 // Tag:     VTK::Shading::Impl, before it, inside the loop along the ray.
 // Defines: what the part after the sample compares with.

@@ -40,7 +40,11 @@ def run(what, command, **environment):
 run("install", [a.cmake, "--install", a.build, "--prefix", first])
 if not failures:
     os.rename(first, prefix)
-    for library in glob.glob(os.path.join(prefix, "**", "*.so*"), recursive=True):
+    libraries = glob.glob(os.path.join(prefix, "**", "*.so*"), recursive=True)
+    for library in libraries + glob.glob(os.path.join(prefix, "bin", "*")):
+        for line in run("ldd", ["ldd", library]).splitlines():
+            if "not found" in line:
+                failures.append(f"{library} does not find {line.strip()}")
         dynamic = subprocess.run(
             ["readelf", "-d", library], check=True, capture_output=True, text=True
         ).stdout
