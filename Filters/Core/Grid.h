@@ -3,6 +3,7 @@
 #ifndef LightTransport_Core_Grid_h
 #define LightTransport_Core_Grid_h
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -24,6 +25,19 @@ struct Grid
     return i + dims[0] * (j + static_cast<std::int64_t>(dims[1]) * k);
   }
   double voxelVolume() const { return spacing[0] * spacing[1] * spacing[2]; }
+  /** Of the axes that have more than one voxel, or of all if none has. */
+  double smallestSpacing() const
+  {
+    double smallest = 0.;
+    for (int a = 0; a < 3; ++a)
+    {
+      if (dims[a] > 1 && !(smallest > 0. && smallest <= spacing[a]))
+      {
+        smallest = spacing[a];
+      }
+    }
+    return smallest > 0. ? smallest : *std::min_element(spacing.begin(), spacing.end());
+  }
 };
 } // namespace lighttransport
 

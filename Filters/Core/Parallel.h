@@ -16,6 +16,9 @@ namespace lighttransport
 using RangeBody = std::function<void(std::int64_t begin, std::int64_t end)>;
 using ParallelFor = std::function<void(std::int64_t n, const RangeBody& body)>;
 
+/** Told the fraction done, in [0, 1], from the calling thread; false means stop. */
+using ProgressFunction = std::function<bool(double fraction)>;
+
 /** The whole range in the calling thread. */
 inline void SerialFor(std::int64_t n, const RangeBody& body)
 {
