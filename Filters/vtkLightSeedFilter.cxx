@@ -231,8 +231,8 @@ vtkImageData* vtkLightSeedFilter::GetFluence()
 //------------------------------------------------------------------------------
 int vtkLightSeedFilter::FillInputPortInformation(int port, vtkInformation* info)
 {
-  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(),
-    port == StrokePort ? "vtkPolyData" : "vtkImageData");
+  info->Set(
+    vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), port == StrokePort ? "vtkPolyData" : "vtkImageData");
   if (port != GridPort)
   {
     info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
@@ -387,8 +387,8 @@ std::string PrepareImage(vtkImageData* image, vtkDataArray* array, const std::st
   const vtkIdType size = image->GetNumberOfPoints();
   if (array->GetNumberOfTuples() != size)
   {
-    text << what << " has " << array->GetNumberOfTuples() << " tuples, expected one for each of the "
-         << size << " points";
+    text << what << " has " << array->GetNumberOfTuples()
+         << " tuples, expected one for each of the " << size << " points";
     return text.str();
   }
   const ParallelFor parallel = vtkLightTransportParallelFor();
@@ -413,16 +413,19 @@ std::string PrepareImage(vtkImageData* image, vtkDataArray* array, const std::st
   if (!vtkLightTransportImage::SameGeometry(image, target))
   {
     prepared.Values.resize(static_cast<std::size_t>(size));
-    parallel(size, [&](std::int64_t begin, std::int64_t end) {
-      std::vector<double> row(static_cast<std::size_t>(std::min<std::int64_t>(4096, end - begin)));
-      for (std::int64_t i = begin; i < end; i += 4096)
+    parallel(size,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        const std::int64_t n = std::min<std::int64_t>(4096, end - i);
-        read(i, n, row.data());
-        std::transform(row.begin(), row.begin() + n, prepared.Values.begin() + i,
-          [](double value) { return static_cast<float>(value); });
-      }
-    });
+        std::vector<double> row(
+          static_cast<std::size_t>(std::min<std::int64_t>(4096, end - begin)));
+        for (std::int64_t i = begin; i < end; i += 4096)
+        {
+          const std::int64_t n = std::min<std::int64_t>(4096, end - i);
+          read(i, n, row.data());
+          std::transform(row.begin(), row.begin() + n, prepared.Values.begin() + i,
+            [](double value) { return static_cast<float>(value); });
+        }
+      });
     prepared.Source.values = prepared.Values.data();
     prepared.Source.grid = vtkLightTransportImage::GridOf(image);
     for (int corner = 0; corner < 4; ++corner)
@@ -538,7 +541,8 @@ std::string vtkLightSeedFilter::Compute(vtkImageData* input, vtkImageData* paint
            << ", expected its weights there";
       return text.str();
     }
-    problem = PrepareImage(painted, array, "the painted image", this->PaintedGain,
+    problem = PrepareImage(
+      painted, array, "the painted image", this->PaintedGain,
       [gain = this->PaintedGain](double weight) { return gain * weight; }, input, prepared[0]);
   }
   if (fluence && problem.empty())
@@ -549,9 +553,10 @@ std::string vtkLightSeedFilter::Compute(vtkImageData* input, vtkImageData* paint
       return "the image for re-injection has no point array \"Fluence\", expected the output of "
              "vtkLightDiffusionFilter";
     }
-    problem = PrepareImage(fluence, array, "the fluence for re-injection", this->ReinjectionGain,
-      [gain = this->ReinjectionGain, threshold = this->ReinjectionThreshold](
-        double phi) { return phi > threshold ? gain * phi : 0.; },
+    problem = PrepareImage(
+      fluence, array, "the fluence for re-injection", this->ReinjectionGain,
+      [gain = this->ReinjectionGain, threshold = this->ReinjectionThreshold](double phi)
+      { return phi > threshold ? gain * phi : 0.; },
       input, prepared[1]);
   }
   if (!problem.empty())
@@ -577,8 +582,8 @@ std::string vtkLightSeedFilter::Compute(vtkImageData* input, vtkImageData* paint
   {
     const bool isSphere = report.badSphere < this->GetNumberOfSpheres();
     text << (isSphere ? "sphere " + std::to_string(report.badSphere) : std::string("a stroke"))
-         << " has the power " << spheres[report.badSphere].power
-         << " in voxels of " << grid.spacing << ", expected a density that float32 can hold";
+         << " has the power " << spheres[report.badSphere].power << " in voxels of " << grid.spacing
+         << ", expected a density that float32 can hold";
     return text.str();
   }
   if (report.badVoxel >= 0)

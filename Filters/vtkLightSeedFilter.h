@@ -84,8 +84,7 @@ public:
 
   ///@{
   /** Change sphere i; an index that does not exist is an error and changes nothing. */
-  void SetSphere(int i, const double center[3], double radius, double power)
-    VTK_SIZEHINT(center, 3)
+  void SetSphere(int i, const double center[3], double radius, double power) VTK_SIZEHINT(center, 3)
   {
     this->SetSphere(i, center[0], center[1], center[2], radius, power);
   }

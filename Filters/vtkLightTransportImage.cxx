@@ -35,13 +35,14 @@ std::vector<T> InType(const std::vector<double>& values)
   {
     if (std::is_floating_point<T>::value)
     {
-      if (std::isinf(value) || std::abs(value) <= static_cast<double>(std::numeric_limits<T>::max()))
+      if (std::isinf(value) ||
+        std::abs(value) <= static_cast<double>(std::numeric_limits<T>::max()))
       {
         typed.push_back(static_cast<T>(value));
       }
     }
     else if (value >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
-      value < 2. * static_cast<double>(std::numeric_limits<T>::max() / 2 + 1) &&
+      value < std::ldexp(1., std::numeric_limits<T>::digits) &&
       value == std::floor(value))
     {
       typed.push_back(static_cast<T>(value));
@@ -64,7 +65,8 @@ struct MakeReader
     using T = typename ArrayT::ValueType;
     this->Reader = [array, component = this->Component, noData = InType<T>(*this->NoData),
                      ghosts = this->Ghosts,
-                     keep = this->Keep](std::int64_t begin, std::int64_t n, double* values) {
+                     keep = this->Keep](std::int64_t begin, std::int64_t n, double* values)
+    {
       for (std::int64_t l = 0; l < n; ++l)
       {
         values[l] = static_cast<double>(array->GetTypedComponent(begin + l, component));
@@ -114,8 +116,8 @@ std::string Problem(vtkImageData* image)
   {
     if (!std::isfinite(spacing[a]) || spacing[a] <= 0.)
     {
-      text << "the spacing of the image is " << spacing[0] << " " << spacing[1] << " "
-           << spacing[2] << ", expected positive finite lengths";
+      text << "the spacing of the image is " << spacing[0] << " " << spacing[1] << " " << spacing[2]
+           << ", expected positive finite lengths";
       return text.str();
     }
     if (!std::isfinite(origin[a]))
@@ -283,7 +285,8 @@ void RequestWholeExtents(vtkInformationVector** inputs, int numberOfPorts)
 //------------------------------------------------------------------------------
 lighttransport::ProgressFunction Progress(vtkAlgorithm* algorithm, double from, double to)
 {
-  return [algorithm, from, to](double fraction) {
+  return [algorithm, from, to](double fraction)
+  {
     algorithm->UpdateProgress(from + (to - from) * fraction);
 #if LIGHTTRANSPORT_VTK_AT_LEAST(9, 3)
     return !algorithm->CheckAbort();

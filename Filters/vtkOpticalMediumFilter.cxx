@@ -74,8 +74,9 @@ lighttransport::ValueReader Composed(vtkPiecewiseFunction* function,
       table[i] = function->GetValue(range.min + static_cast<double>(i));
     }
   }
-  return [function, read, table, min = range.min](
-           std::int64_t begin, std::int64_t n, double* values) {
+  return
+    [function, read, table, min = range.min](std::int64_t begin, std::int64_t n, double* values)
+  {
     read(begin, n, values);
     for (std::int64_t l = 0; l < n; ++l)
     {
@@ -283,9 +284,9 @@ std::string vtkOpticalMediumFilter::Compute(
   const vtkIdType size = input->GetNumberOfPoints();
   if (!scalars)
   {
-    const char* name =
-      this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
-    text << "the image has no point array " << (name ? std::string("\"") + name + "\"" : "of scalars")
+    const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
+    text << "the image has no point array "
+         << (name ? std::string("\"") + name + "\"" : "of scalars")
          << ", expected active point scalars or one named by SetInputArrayToProcess";
     return text.str();
   }

@@ -20,7 +20,8 @@ constexpr std::int64_t ReadLength = 4096;
 void ConvolveRow(int n, int radius, const double* kernels, const double* in, double* out)
 {
   const int taps = 2 * radius + 1;
-  const auto border = [&](int begin, int end) {
+  const auto border = [&](int begin, int end)
+  {
     for (int i = begin; i < end; ++i)
     {
       const double* kernel = kernels + std::size_t(i) * taps;
@@ -69,46 +70,48 @@ ValueRange FindValueRange(std::int64_t size, const ValueReader& read, const Para
   range.min = std::numeric_limits<double>::infinity();
   range.max = -std::numeric_limits<double>::infinity();
   std::mutex mutex;
-  parallel(size, [&](std::int64_t begin, std::int64_t end) {
-    ValueRange mine;
-    mine.min = std::numeric_limits<double>::infinity();
-    mine.max = -std::numeric_limits<double>::infinity();
-    std::vector<double> values(static_cast<std::size_t>(std::min(ReadLength, end - begin)));
-    for (std::int64_t i = begin; i < end; i += ReadLength)
+  parallel(size,
+    [&](std::int64_t begin, std::int64_t end)
     {
-      const std::int64_t n = std::min(ReadLength, end - i);
-      read(i, n, values.data());
-      for (std::int64_t l = 0; l < n; ++l)
+      ValueRange mine;
+      mine.min = std::numeric_limits<double>::infinity();
+      mine.max = -std::numeric_limits<double>::infinity();
+      std::vector<double> values(static_cast<std::size_t>(std::min(ReadLength, end - begin)));
+      for (std::int64_t i = begin; i < end; i += ReadLength)
       {
-        const double value = values[l];
-        if (std::isnan(value))
+        const std::int64_t n = std::min(ReadLength, end - i);
+        read(i, n, values.data());
+        for (std::int64_t l = 0; l < n; ++l)
         {
-          ++mine.numberOfNaN;
-          mine.firstNaN = mine.firstNaN < 0 ? i + l : mine.firstNaN;
-        }
-        else if (std::isinf(value))
-        {
-          mine.firstInfinite = mine.firstInfinite < 0 ? i + l : mine.firstInfinite;
-        }
-        else
-        {
-          ++mine.numberOfFinite;
-          mine.min = std::min(mine.min, value);
-          mine.max = std::max(mine.max, value);
+          const double value = values[l];
+          if (std::isnan(value))
+          {
+            ++mine.numberOfNaN;
+            mine.firstNaN = mine.firstNaN < 0 ? i + l : mine.firstNaN;
+          }
+          else if (std::isinf(value))
+          {
+            mine.firstInfinite = mine.firstInfinite < 0 ? i + l : mine.firstInfinite;
+          }
+          else
+          {
+            ++mine.numberOfFinite;
+            mine.min = std::min(mine.min, value);
+            mine.max = std::max(mine.max, value);
+          }
         }
       }
-    }
-    const std::lock_guard<std::mutex> lock(mutex);
-    range.min = std::min(range.min, mine.min);
-    range.max = std::max(range.max, mine.max);
-    range.numberOfFinite += mine.numberOfFinite;
-    range.numberOfNaN += mine.numberOfNaN;
-    const auto first = [](std::int64_t a, std::int64_t b) {
-      return a < 0 ? b : b < 0 ? a : std::min(a, b);
-    };
-    range.firstNaN = first(range.firstNaN, mine.firstNaN);
-    range.firstInfinite = first(range.firstInfinite, mine.firstInfinite);
-  });
+      const std::lock_guard<std::mutex> lock(mutex);
+      range.min = std::min(range.min, mine.min);
+      range.max = std::max(range.max, mine.max);
+      range.numberOfFinite += mine.numberOfFinite;
+      range.numberOfNaN += mine.numberOfNaN;
+      const auto first = [](std::int64_t a, std::int64_t b) {
+        return a < 0 ? b : b < 0 ? a : std::min(a, b);
+      };
+      range.firstNaN = first(range.firstNaN, mine.firstNaN);
+      range.firstInfinite = first(range.firstInfinite, mine.firstInfinite);
+    });
   if (range.numberOfFinite == 0)
   {
     range.min = range.max = 0.;
@@ -168,9 +171,8 @@ GradientMagnitude::GradientMagnitude(const Grid& grid, double sigma)
       {
         const std::size_t at = static_cast<std::size_t>(i) * taps + t;
         axis.smooth[at] = axis.weight[t] / m0;
-        axis.slope[at] = axis.radius > 0
-          ? axis.smooth[at] * (axis.offset[t] - mean) / (variance * axis.unit)
-          : 0.;
+        axis.slope[at] =
+          axis.radius > 0 ? axis.smooth[at] * (axis.offset[t] - mean) / (variance * axis.unit) : 0.;
       }
     }
   }
@@ -208,15 +210,17 @@ bool GradientMagnitude::compute(const ValueReader& read, double reference, doubl
       return false;
     }
     const std::int64_t first = tiles * step / ProgressSteps;
-    parallel(tiles * (step + 1) / ProgressSteps - first, [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t tile = first + begin; tile < first + end; ++tile)
+    parallel(tiles * (step + 1) / ProgressSteps - first,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        const int j0 = static_cast<int>(tile % rows) * TileRows;
-        const int k0 = static_cast<int>(tile / rows) * TileSlices;
-        this->computeTile(read, reference, factor, magnitude, j0,
-          std::min(j0 + TileRows, dims[1]), k0, std::min(k0 + TileSlices, dims[2]));
-      }
-    });
+        for (std::int64_t tile = first + begin; tile < first + end; ++tile)
+        {
+          const int j0 = static_cast<int>(tile % rows) * TileRows;
+          const int k0 = static_cast<int>(tile / rows) * TileSlices;
+          this->computeTile(read, reference, factor, magnitude, j0,
+            std::min(j0 + TileRows, dims[1]), k0, std::min(k0 + TileSlices, dims[2]));
+        }
+      });
   }
   return !progress || progress(1.);
 }
@@ -238,7 +242,8 @@ void GradientMagnitude::computeTile(const ValueReader& read, double reference, d
   tile.hole.resize(2 * rz + 1);
   tile.values.resize(tile.hole.size() * tile.planeSize);
 
-  const auto readPlane = [&](int k) {
+  const auto readPlane = [&](int k)
+  {
     double* plane = tile.plane(k);
     read(this->grid.index(0, tile.jr0, k), tile.planeSize, plane);
     char hole = 0;
@@ -371,12 +376,13 @@ void GradientMagnitude::fitHoles(Tile& tile, int k, double factor, float* magnit
     { 0, 2, 0 }, { 0, 0, 0 }, { 0, 0, 1 }, { 0, 1, 0 } };
   tile.x.resize(14 * std::size_t(nx));
   std::vector<double> kernel(2 * std::size_t(ax.radius) + 1);
-  const auto alongX = [&](int power, const double* in, double* out) {
+  const auto alongX = [&](int power, const double* in, double* out)
+  {
     for (int i = 0; i < nx; ++i)
     {
       double sum = 0.;
-      for (int t = std::max(0, ax.radius - i);
-           t < std::min(2 * ax.radius + 1, nx + ax.radius - i); ++t)
+      for (int t = std::max(0, ax.radius - i); t < std::min(2 * ax.radius + 1, nx + ax.radius - i);
+           ++t)
       {
         const double u = ax.offset[t];
         const double w = ax.weight[t] * (power == 0 ? 1. : power == 1 ? u : u * u);

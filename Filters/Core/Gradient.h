@@ -69,11 +69,11 @@ private:
   struct Axis
   {
     int radius = 0;
-    double unit = 1.;            ///< length in which offsets are measured here
-    std::vector<double> weight;  ///< Gaussian, not normalised, by |offset|
-    std::vector<double> smooth;  ///< sums to 1 at each position
-    std::vector<double> slope;   ///< slope of the fit, per length
-    std::vector<double> offset;  ///< offsets in `unit`
+    double unit = 1.;           ///< length in which offsets are measured here
+    std::vector<double> weight; ///< Gaussian, not normalised, by |offset|
+    std::vector<double> smooth; ///< sums to 1 at each position
+    std::vector<double> slope;  ///< slope of the fit, per length
+    std::vector<double> offset; ///< offsets in `unit`
     const double* smoothAt(int i) const { return &smooth[std::size_t(i) * (2 * radius + 1)]; }
     const double* slopeAt(int i) const { return &slope[std::size_t(i) * (2 * radius + 1)]; }
   };

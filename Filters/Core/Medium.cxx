@@ -131,9 +131,7 @@ MediumReport ComputeMedium(const Grid& grid, const ValueReader& signal, const Va
     }
     const double spread = range.max > range.min ? range.max - range.min : 1.;
     const GradientMagnitude gradient(unitGrid, parameters.derivativeScale / h);
-    const auto partly = [&](double fraction) {
-      return !progress || progress(mapFrom * fraction);
-    };
+    const auto partly = [&](double fraction) { return !progress || progress(mapFrom * fraction); };
     if (!gradient.compute(signal, range.min, 1. / spread, D, parallel, partly))
     {
       report.cancelled = true;
@@ -157,10 +155,10 @@ MediumReport ComputeMedium(const Grid& grid, const ValueReader& signal, const Va
   const double albedoFactor =
     (1. - parameters.albedo) / (3. * (1. - parameters.albedo * parameters.anisotropy));
   std::atomic<std::int64_t> walls{ 0 };
-  const auto map = [&](std::int64_t begin, std::int64_t end) {
+  const auto map = [&](std::int64_t begin, std::int64_t end)
+  {
     std::vector<double> beta(static_cast<std::size_t>(std::min(ReadLength, end - begin)));
-    std::vector<double> given(
-      parameters.absorption == AbsorptionRule::Function ? beta.size() : 0);
+    std::vector<double> given(parameters.absorption == AbsorptionRule::Function ? beta.size() : 0);
     std::int64_t myWalls = 0;
     for (std::int64_t i = begin; i < end; i += ReadLength)
     {
@@ -222,8 +220,8 @@ MediumReport ComputeMedium(const Grid& grid, const ValueReader& signal, const Va
     }
     const std::int64_t first = grid.size() * step / MapSteps;
     const std::int64_t last = grid.size() * (step + 1) / MapSteps;
-    parallel(last - first,
-      [&](std::int64_t begin, std::int64_t end) { map(first + begin, first + end); });
+    parallel(
+      last - first, [&](std::int64_t begin, std::int64_t end) { map(first + begin, first + end); });
   }
   report.numberOfWalls = walls;
   report.cancelled = progress && !progress(1.);

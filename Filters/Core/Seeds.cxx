@@ -53,8 +53,8 @@ Footprint FootprintOf(const Grid& grid, const SphereSource& sphere)
     for (int a = 0; a < 3; ++a)
     {
       const double c = sphere.center[a];
-      footprint.first[a] = static_cast<int>(
-        std::min<double>(std::max(std::ceil(c - reach / h[a]), 0.), grid.dims[a]));
+      footprint.first[a] =
+        static_cast<int>(std::min<double>(std::max(std::ceil(c - reach / h[a]), 0.), grid.dims[a]));
       footprint.last[a] = static_cast<int>(
         std::max(std::min<double>(std::floor(c + reach / h[a]), grid.dims[a] - 1), -1.));
     }
@@ -81,8 +81,7 @@ Footprint FootprintOf(const Grid& grid, const SphereSource& sphere)
     const double size = std::log(std::abs(sphere.power)) - std::log(grid.spacing[0]) -
       std::log(grid.spacing[1]) - std::log(grid.spacing[2]) - std::log(sum);
     footprint.bad = size > std::log(LargestFloat) || size < std::log(SmallestFloat);
-    footprint.density =
-      footprint.bad ? 0. : (sphere.power < 0. ? -std::exp(size) : std::exp(size));
+    footprint.density = footprint.bad ? 0. : (sphere.power < 0. ? -std::exp(size) : std::exp(size));
     const double volume = grid.voxelVolume();
     if (!footprint.bad && std::isnormal(volume))
     {
@@ -110,12 +109,14 @@ double Interpolate(const ImageSource& image, const std::array<double, 3>& index)
     high[a] = std::min(low[a] + 1, grid.dims[a] - 1);
     part[a] = inside - low[a];
   }
-  const auto row = [&](int j, int k) {
+  const auto row = [&](int j, int k)
+  {
     const double v0 = image.values[grid.index(low[0], j, k)];
     const double v1 = image.values[grid.index(high[0], j, k)];
     return v0 + part[0] * (v1 - v0);
   };
-  const auto plane = [&](int k) {
+  const auto plane = [&](int k)
+  {
     const double v0 = row(low[1], k);
     return v0 + part[1] * (row(high[1], k) - v0);
   };
@@ -231,8 +232,8 @@ bool StrokeToSpheres(const Grid& grid, const Stroke& stroke, std::vector<SphereS
     {
       continue;
     }
-    const double step = std::max(0.5 * grid.smallestSpacing(),
-      0.25 * std::min(stroke.radius[p], stroke.radius[p + 1]));
+    const double step = std::max(
+      0.5 * grid.smallestSpacing(), 0.25 * std::min(stroke.radius[p], stroke.radius[p + 1]));
     const std::int64_t pieces =
       std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(segment * (t1 - t0) / step)));
     for (std::int64_t piece = 0; piece < pieces; ++piece)
@@ -284,12 +285,14 @@ SourceReport ComputeSources(const Grid& grid, const std::vector<SphereSource>& s
 
   // Where the spheres lie and how dense they are; then the spheres of each slice.
   std::vector<Footprint> footprints(spheres.size());
-  parallel(static_cast<std::int64_t>(spheres.size()), [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t s = begin; s < end; ++s)
+  parallel(static_cast<std::int64_t>(spheres.size()),
+    [&](std::int64_t begin, std::int64_t end)
     {
-      footprints[s] = FootprintOf(grid, spheres[s]);
-    }
-  });
+      for (std::int64_t s = begin; s < end; ++s)
+      {
+        footprints[s] = FootprintOf(grid, spheres[s]);
+      }
+    });
   const int slices = grid.dims[2];
   std::vector<std::vector<std::int64_t>> spheresOf(slices);
   for (std::size_t s = 0; s < spheres.size(); ++s)
@@ -315,7 +318,8 @@ SourceReport ComputeSources(const Grid& grid, const std::vector<SphereSource>& s
   const int ny = grid.dims[1];
   std::vector<double> sums(slices, 0.);
   std::vector<std::int64_t> bad(slices, -1);
-  const auto slice = [&](int k, std::vector<double>& plane, std::vector<double>& row) {
+  const auto slice = [&](int k, std::vector<double>& plane, std::vector<double>& row)
+  {
     std::fill(plane.begin(), plane.end(), 0.);
     for (std::int64_t s : spheresOf[k])
     {
@@ -324,8 +328,8 @@ SourceReport ComputeSources(const Grid& grid, const std::vector<SphereSource>& s
       {
         for (int i = footprint.first[0]; i <= footprint.last[0]; ++i)
         {
-          plane[i + std::int64_t(nx) * j] += footprint.density *
-            (footprint.single ? 1. : InsideFraction(grid, spheres[s], i, j, k));
+          plane[i + std::int64_t(nx) * j] +=
+            footprint.density * (footprint.single ? 1. : InsideFraction(grid, spheres[s], i, j, k));
         }
       }
     }
@@ -372,14 +376,16 @@ SourceReport ComputeSources(const Grid& grid, const std::vector<SphereSource>& s
     }
     const int first = static_cast<int>(std::int64_t(slices) * step / ProgressSteps);
     const int last = static_cast<int>(std::int64_t(slices) * (step + 1) / ProgressSteps);
-    parallel(last - first, [&](std::int64_t begin, std::int64_t end) {
-      std::vector<double> plane(static_cast<std::size_t>(nx) * ny);
-      std::vector<double> row(nx);
-      for (std::int64_t k = begin; k < end; ++k)
+    parallel(last - first,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        slice(first + static_cast<int>(k), plane, row);
-      }
-    });
+        std::vector<double> plane(static_cast<std::size_t>(nx) * ny);
+        std::vector<double> row(nx);
+        for (std::int64_t k = begin; k < end; ++k)
+        {
+          slice(first + static_cast<int>(k), plane, row);
+        }
+      });
   }
   for (int k = 0; k < slices; ++k)
   {
