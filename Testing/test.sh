@@ -45,7 +45,7 @@ stage asan lighttransport_build asan check-Core check-Filters
 stage tsan lighttransport_build tsan check-Core
 
 say "ctest"
-ctest --test-dir build/dev --output-on-failure --no-tests=error \
+ctest --test-dir build/dev -j 2 --output-on-failure --no-tests=error \
   -LE '^(long|benchmark)$' >"$lighttransport_log/ctest.log" 2>&1 || failed+=(ctest)
 # All of a failing test's output, then the summary.
 if [[ " ${failed[*]-} " == *" ctest "* ]]; then
