@@ -42,8 +42,7 @@ std::vector<T> InType(const std::vector<double>& values)
       }
     }
     else if (value >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
-      value < std::ldexp(1., std::numeric_limits<T>::digits) &&
-      value == std::floor(value))
+      value < std::ldexp(1., std::numeric_limits<T>::digits) && value == std::floor(value))
     {
       typed.push_back(static_cast<T>(value));
     }

@@ -4,6 +4,7 @@
 
 #include "vtkLightFieldProperty.h"
 #include "vtkLightTransportArrays.h"
+#include "vtkLightTransportCompat.h"
 #include "vtkLightTransportVolumeMapperDec.h"
 #include "vtkLightTransportVolumeMapperRayBegin.h"
 #include "vtkLightTransportVolumeMapperRayEnd.h"
@@ -39,7 +40,9 @@
 #include "vtkTrivialProducer.h"
 #include "vtkVersion.h"
 #include "vtkVolume.h"
-#include "vtk_glew.h"
+
+// GLEW or glad, by VTK's version.
+#include LIGHTTRANSPORT_GL_HEADER
 
 #include <algorithm>
 #include <array>
