@@ -2,8 +2,163 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Diffusion.h"
 
+#include "Core/Kernel.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
 namespace lighttransport
 {
+namespace
+{
+/** A sink at or below this (relative to the largest diagonal) is none. */
+constexpr float NoSink = 1e-30f;
+
+double now()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/** F_dr's integrand is smooth in the angle of refraction side of the critical angle. */
+double unpolarisedFresnel(double cosInside, double eta)
+{
+  const double sin2Outside = eta * eta * (1. - cosInside * cosInside);
+  if (sin2Outside >= 1.)
+  {
+    return 1.;
+  }
+  const double cosOutside = std::sqrt(1. - sin2Outside);
+  const double rs = (eta * cosInside - cosOutside) / (eta * cosInside + cosOutside);
+  const double rp = (cosInside - eta * cosOutside) / (cosInside + eta * cosOutside);
+  return 0.5 * (rs * rs + rp * rp);
+}
+
+/** sum g (x_i - x_j) + s x_i of one row in double; rows outside are null. */
+struct DoubleRow
+{
+  int n;
+  const float *gx, *gy, *gyS, *gz, *gzB, *s;
+  const double *x, *xS, *xN, *xB, *xT;
+};
+
+DoubleRow doubleRow(const DiffusionOperator& A, const double* x, std::int64_t r)
+{
+  const std::int64_t nx = A.dims[0];
+  const std::int64_t ny = A.dims[1];
+  const std::int64_t nz = A.dims[2];
+  const std::int64_t j = r % ny;
+  const std::int64_t k = r / ny;
+  const std::int64_t o = r * nx;
+  const float* zeros = A.zeros.data();
+  // The face to a row outside has conductance 0: the row itself can stand for it.
+  return { A.dims[0], A.g[0].data() + o, A.g[1].data() + o,
+    j > 0 ? A.g[1].data() + o - nx : zeros, A.g[2].data() + o,
+    k > 0 ? A.g[2].data() + o - nx * ny : zeros, A.s.data() + o, x + o,
+    j > 0 ? x + o - nx : x + o, j + 1 < ny ? x + o + nx : x + o, k > 0 ? x + o - nx * ny : x + o,
+    k + 1 < nz ? x + o + nx * ny : x + o };
+}
+
+LIGHTTRANSPORT_SIMD
+void applyDouble(const DoubleRow& row, double* LIGHTTRANSPORT_RESTRICT y)
+{
+  const int n = row.n;
+  const float* LIGHTTRANSPORT_RESTRICT gx = row.gx;
+  const float* LIGHTTRANSPORT_RESTRICT gy = row.gy;
+  const float* LIGHTTRANSPORT_RESTRICT gyS = row.gyS;
+  const float* LIGHTTRANSPORT_RESTRICT gz = row.gz;
+  const float* LIGHTTRANSPORT_RESTRICT gzB = row.gzB;
+  const float* LIGHTTRANSPORT_RESTRICT s = row.s;
+  const double *x = row.x, *xS = row.xS, *xN = row.xN, *xB = row.xB, *xT = row.xT;
+  for (int i = 0; i < n; ++i)
+  {
+    const double c = x[i];
+    y[i] = double(gy[i]) * (c - xN[i]) + double(gyS[i]) * (c - xS[i]) +
+      double(gz[i]) * (c - xT[i]) + double(gzB[i]) * (c - xB[i]) + double(s[i]) * c;
+  }
+  for (int i = 0; i + 1 < n; ++i)
+  {
+    y[i] += double(gx[i]) * (x[i] - x[i + 1]);
+  }
+  for (int i = 1; i < n; ++i)
+  {
+    y[i] += double(gx[i - 1]) * (x[i] - x[i - 1]);
+  }
+}
+
+LIGHTTRANSPORT_SIMD
+void twoDots(std::int64_t n, const float* LIGHTTRANSPORT_RESTRICT a,
+  const float* LIGHTTRANSPORT_RESTRICT b, const float* LIGHTTRANSPORT_RESTRICT c, double* sums)
+{
+  double ab[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  double ac[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  std::int64_t i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      ab[l] += double(a[i + l]) * double(b[i + l]);
+      ac[l] += double(a[i + l]) * double(c[i + l]);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    ab[0] += double(a[i]) * double(b[i]);
+    ac[0] += double(a[i]) * double(c[i]);
+  }
+  sums[0] = ((ab[0] + ab[4]) + (ab[1] + ab[5])) + ((ab[2] + ab[6]) + (ab[3] + ab[7]));
+  sums[1] = ((ac[0] + ac[4]) + (ac[1] + ac[5])) + ((ac[2] + ac[6]) + (ac[3] + ac[7]));
+}
+
+/** phi += step p; r -= alpha Ap; returns r . r */
+LIGHTTRANSPORT_SIMD
+double update(std::int64_t n, double step, float alpha, const float* LIGHTTRANSPORT_RESTRICT p,
+  const float* LIGHTTRANSPORT_RESTRICT Ap, double* LIGHTTRANSPORT_RESTRICT phi,
+  float* LIGHTTRANSPORT_RESTRICT r)
+{
+  double rr[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  std::int64_t i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      phi[i + l] += step * double(p[i + l]);
+      const float v = r[i + l] - alpha * Ap[i + l];
+      r[i + l] = v;
+      rr[l] += double(v) * double(v);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    phi[i] += step * double(p[i]);
+    r[i] -= alpha * Ap[i];
+    rr[0] += double(r[i]) * double(r[i]);
+  }
+  return ((rr[0] + rr[4]) + (rr[1] + rr[5])) + ((rr[2] + rr[6]) + (rr[3] + rr[7]));
+}
+
+LIGHTTRANSPORT_SIMD
+void combine(std::int64_t n, float beta, const float* LIGHTTRANSPORT_RESTRICT z,
+  float* LIGHTTRANSPORT_RESTRICT p)
+{
+  for (std::int64_t i = 0; i < n; ++i)
+  {
+    p[i] = z[i] + beta * p[i];
+  }
+}
+
+template <class T>
+double harmonicMean(T a, T b)
+{
+  const double x = static_cast<double>(a);
+  const double y = static_cast<double>(b);
+  return x > 0. && y > 0. ? 2. * x * (y / (x + y)) : 0.;
+}
+} // namespace
+
+//------------------------------------------------------------------------------
 const char* ToString(StopReason reason)
 {
   switch (reason)
@@ -27,4 +182,941 @@ const char* ToString(StopReason reason)
   }
   return "Unknown";
 }
+
+double DiffuseFresnelReflectance(double eta)
+{
+  if (eta == 1.)
+  {
+    return 0.;
+  }
+  // 2 int F mu dmu = int F d(mu^2); beyond the critical angle F = 1. Inside the
+  // cone, u = mu^2 - critical >= 0 has a square-root kink at 0: u = t^2.
+  const double critical = eta > 1. ? 1. - 1. / (eta * eta) : 0.;
+  constexpr int intervals = 2000; // Simpson
+  const double length = std::sqrt(1. - critical);
+  double sum = 0.;
+  for (int i = 0; i <= intervals; ++i)
+  {
+    const double t = length * i / intervals;
+    const double weight = i == 0 || i == intervals ? 1. : (i % 2 ? 4. : 2.);
+    const double mu = std::sqrt(std::min(1., critical + t * t));
+    sum += weight * unpolarisedFresnel(mu, eta) * 2. * t;
+  }
+  return critical + sum * length / (3. * intervals);
+}
+
+double BoundaryFactor(double eta)
+{
+  const double F = DiffuseFresnelReflectance(eta);
+  return (1. + F) / (1. - F);
+}
+
+//------------------------------------------------------------------------------
+DiffusionSolver::DiffusionSolver(ParallelFor how)
+  : parallelFor(std::move(how))
+{
+}
+
+std::int64_t DiffusionSolver::rows() const
+{
+  return static_cast<std::int64_t>(this->box.dims[1]) * this->box.dims[2];
+}
+
+std::int64_t DiffusionSolver::bytesHeld() const
+{
+  return this->A.bytes() + this->multigrid.bytes() + this->sinkWithoutShift.bytes();
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
+{
+  DiffusionReport report;
+  const double began = now();
+  this->box = medium.grid;
+  this->shift = 0.;
+  this->sinkWithoutShift.release();
+  this->multigrid.release();
+  this->multigridReady = false;
+
+  const std::array<int, 3>& n = this->box.dims;
+  const std::array<double, 3>& h = this->box.spacing;
+  const std::int64_t size = this->box.size();
+  const auto bad = [&report](const std::string& what) {
+    report.reason = StopReason::BadInput;
+    report.message = what;
+    return report;
+  };
+  for (int d = 0; d < 3; ++d)
+  {
+    if (n[d] < 1)
+    {
+      return bad("the grid is empty");
+    }
+    if (!std::isfinite(h[d]) || !(h[d] > 0.))
+    {
+      return bad("the spacing is not positive");
+    }
+  }
+  if (!std::isfinite(medium.refractiveIndexRatio) || !(medium.refractiveIndexRatio > 0.))
+  {
+    return bad("the refractive index ratio is not positive");
+  }
+
+  // A voxel outside the domain is a wall; so is one whose D is 0.
+  const T* D = medium.D;
+  const std::uint8_t* outside = medium.outside;
+  const auto diffusion = [D, outside](std::int64_t i) {
+    return outside && outside[i] ? T(0) : D[i];
+  };
+
+  // 1. check, and find the scale: no diagonal is above it
+  struct Extremes
+  {
+    std::int64_t badD = -1, badSigma = -1;
+    double D = 0., sigma = 0.;
+  };
+  std::vector<Extremes> extremes(static_cast<std::size_t>(this->rows()));
+  ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
+    for (std::int64_t r = begin; r < end; ++r)
+    {
+      Extremes& e = extremes[static_cast<std::size_t>(r)];
+      for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
+      {
+        if (outside && outside[i])
+        {
+          continue;
+        }
+        if (!std::isfinite(D[i]) || D[i] < T(0))
+        {
+          e.badD = e.badD < 0 ? i : e.badD;
+          continue;
+        }
+        e.D = std::max(e.D, static_cast<double>(D[i]));
+        if (medium.sigma_a)
+        {
+          if (!std::isfinite(medium.sigma_a[i]) || medium.sigma_a[i] < T(0))
+          {
+            e.badSigma = e.badSigma < 0 ? i : e.badSigma;
+            continue;
+          }
+          e.sigma = std::max(e.sigma, static_cast<double>(medium.sigma_a[i]));
+        }
+      }
+    }
+  });
+  Extremes all;
+  for (const Extremes& e : extremes)
+  {
+    all.badD = all.badD < 0 ? e.badD : all.badD;
+    all.badSigma = all.badSigma < 0 ? e.badSigma : all.badSigma;
+    all.D = std::max(all.D, e.D);
+    all.sigma = std::max(all.sigma, e.sigma);
+  }
+  extremes = std::vector<Extremes>();
+  const auto describe = [&](const char* name, std::int64_t i, double value, const char* unit) {
+    std::ostringstream text;
+    text << name << " is " << value << " at voxel (" << i % n[0] << ", " << (i / n[0]) % n[1]
+         << ", " << i / (static_cast<std::int64_t>(n[0]) * n[1])
+         << "); expected a finite value >= 0 (" << unit << ")";
+    return text.str();
+  };
+  if (all.badD >= 0)
+  {
+    return bad(describe(
+      "the diffusion coefficient", all.badD, static_cast<double>(D[all.badD]), "length"));
+  }
+  if (all.badSigma >= 0)
+  {
+    return bad(describe("the absorption", all.badSigma,
+      static_cast<double>(medium.sigma_a[all.badSigma]), "1/length"));
+  }
+  // An axis with one voxel carries no flux: the image is invariant along it.
+  double perD = 0.;
+  for (int d = 0; d < 3; ++d)
+  {
+    perD += n[d] > 1 ? 4. / (h[d] * h[d]) : 0.;
+  }
+  this->scale = all.D * perD + all.sigma;
+  if (!(this->scale > 0.))
+  {
+    this->scale = 1.;
+  }
+  if (!std::isfinite(this->scale))
+  {
+    return bad("D / spacing^2 is too large for double precision");
+  }
+
+  // 2. the operator
+  this->A.allocate(n);
+  this->boundaryOf(medium.boundary);
+  const double twoA = medium.boundary == Boundary::Robin
+    ? 2. * BoundaryFactor(medium.refractiveIndexRatio)
+    : 0.;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  const double inverse = 1. / this->scale;
+  ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
+    for (std::int64_t r = begin; r < end; ++r)
+    {
+      int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
+      for (at[0] = 0; at[0] < n[0]; ++at[0])
+      {
+        const std::int64_t i = at[0] + r * n[0];
+        const T Di = diffusion(i);
+        double sink = medium.sigma_a && !(outside && outside[i])
+          ? static_cast<double>(medium.sigma_a[i]) * inverse
+          : 0.;
+        for (int d = 0; d < 3; ++d)
+        {
+          if (at[d] + 1 < n[d])
+          {
+            this->A.g[d][i] = static_cast<float>(
+              harmonicMean(Di, diffusion(i + stride[d])) * inverse / (h[d] * h[d]));
+          }
+          if (n[d] > 1 && medium.boundary != Boundary::ZeroFlux)
+          {
+            for (int side = 0; side < 2; ++side)
+            {
+              if (at[d] == (side ? n[d] - 1 : 0))
+              {
+                const double Dd = static_cast<double>(Di);
+                const double out = Dd / (0.5 * h[d] + twoA * Dd) / h[d] * inverse;
+                this->border[d][side][static_cast<std::size_t>(this->borderIndex(d, at))] =
+                  static_cast<float>(out);
+                sink += out;
+              }
+            }
+          }
+        }
+        this->A.s[i] = static_cast<float>(sink);
+      }
+    }
+  });
+
+  // 3. what the solvers ask of it
+  struct Summary
+  {
+    float diagonal = 0.f, gershgorin = 0.f;
+    bool sink = false, noSink = false, wall = false;
+  };
+  std::vector<Summary> summaries(static_cast<std::size_t>(this->rows()));
+  ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
+    for (std::int64_t r = begin; r < end; ++r)
+    {
+      Summary& summary = summaries[static_cast<std::size_t>(r)];
+      const int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
+      for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
+      {
+        if (outside && outside[i])
+        {
+          continue;
+        }
+        float faces = this->A.g[0][i] + (i > 0 ? this->A.g[0][i - 1] : 0.f) + this->A.g[1][i] +
+          (at[1] > 0 ? this->A.g[1][i - stride[1]] : 0.f) + this->A.g[2][i] +
+          (at[2] > 0 ? this->A.g[2][i - stride[2]] : 0.f);
+        summary.diagonal = std::max(summary.diagonal, faces + this->A.s[i]);
+        summary.gershgorin = std::max(summary.gershgorin, 2.f * faces + this->A.s[i]);
+        (this->A.s[i] > NoSink ? summary.sink : summary.noSink) = true;
+        summary.wall = summary.wall || !(static_cast<double>(diffusion(i)) > 0.);
+      }
+    }
+  });
+  Summary total;
+  for (const Summary& summary : summaries)
+  {
+    total.diagonal = std::max(total.diagonal, summary.diagonal);
+    total.gershgorin = std::max(total.gershgorin, summary.gershgorin);
+    total.sink = total.sink || summary.sink;
+    total.noSink = total.noSink || summary.noSink;
+    total.wall = total.wall || summary.wall;
+  }
+  this->largestDiagonal = static_cast<double>(total.diagonal);
+  this->gershgorin = static_cast<double>(total.gershgorin);
+  this->anySink = total.sink;
+  this->everySink = !total.noSink;
+  this->anyWall = total.wall || outside;
+  CloseIsolated(this->A, NoSink, this->parallelFor);
+
+  report.reason = StopReason::Converged;
+  report.seconds = now() - began;
+  report.bytes = this->bytesHeld();
+  return report;
+}
+
+void DiffusionSolver::boundaryOf(Boundary boundary)
+{
+  for (int d = 0; d < 3; ++d)
+  {
+    const std::int64_t faces = this->box.dims[d] > 1 && boundary != Boundary::ZeroFlux
+      ? this->box.size() / this->box.dims[d]
+      : 0;
+    for (auto& side : this->border[d])
+    {
+      side.assign(static_cast<std::size_t>(faces), 0.f);
+    }
+  }
+}
+
+std::int64_t DiffusionSolver::borderIndex(int d, const int at[3]) const
+{
+  const int u = d == 0 ? 1 : 0;
+  const int v = d == 2 ? 1 : 2;
+  return at[u] + static_cast<std::int64_t>(this->box.dims[u]) * at[v];
+}
+
+//------------------------------------------------------------------------------
+double DiffusionSolver::positivityBound() const
+{
+  return this->largestDiagonal > 0. ? 1. / (this->scale * this->largestDiagonal)
+                                    : std::numeric_limits<double>::max();
+}
+
+double DiffusionSolver::stabilityBound() const
+{
+  return this->gershgorin > 0. ? 2. / (this->scale * this->gershgorin)
+                               : std::numeric_limits<double>::max();
+}
+
+//------------------------------------------------------------------------------
+void DiffusionSolver::setShift(double value)
+{
+  if (value == this->shift)
+  {
+    return;
+  }
+  const std::int64_t size = this->box.size();
+  if (this->sinkWithoutShift.empty())
+  {
+    this->sinkWithoutShift.allocate(size);
+    std::copy(this->A.s.data(), this->A.s.data() + size, this->sinkWithoutShift.data());
+  }
+  for (std::int64_t i = 0; i < size; ++i)
+  {
+    this->A.s[i] = static_cast<float>(static_cast<double>(this->sinkWithoutShift[i]) + value);
+  }
+  if (value == 0.)
+  {
+    this->sinkWithoutShift.release();
+  }
+  this->shift = value;
+  this->multigridReady = false;
+}
+
+void DiffusionSolver::prepareMultigrid()
+{
+  if (!this->multigridReady)
+  {
+    this->multigrid.setup(this->A, this->parallelFor);
+    this->multigridReady = true;
+  }
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+double DiffusionSolver::norm(const RightHandSide<T>& b) const
+{
+  const int nx = this->box.dims[0];
+  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(), [&](std::int64_t r) {
+    double sum = 0.;
+    for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+    {
+      const double v = b.qScale * static_cast<double>(b.q[i]) - b.mean +
+        (b.previous ? b.shift * b.previous[i] : 0.);
+      sum += v * v;
+    }
+    return sum;
+  }));
+}
+
+template <class T>
+double DiffusionSolver::residual(
+  const RightHandSide<T>& b, const double* phi, float* out, double rScale) const
+{
+  const int nx = this->box.dims[0];
+  const double inverse = 1. / rScale;
+  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(), [&](std::int64_t r) {
+    static thread_local std::vector<double> y;
+    y.resize(static_cast<std::size_t>(nx));
+    applyDouble(doubleRow(this->A, phi, r), y.data());
+    double sum = 0.;
+    const std::int64_t o = r * nx;
+    for (int i = 0; i < nx; ++i)
+    {
+      const double v = b.qScale * static_cast<double>(b.q[o + i]) - b.mean +
+        (b.previous ? b.shift * b.previous[o + i] : 0.) - y[static_cast<std::size_t>(i)];
+      sum += v * v;
+      if (out)
+      {
+        out[o + i] = static_cast<float>(v * inverse);
+      }
+    }
+    return sum;
+  }));
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
+  const DiffusionControl& control, double progressBegin, double progressEnd,
+  DiffusionReport& report)
+{
+  const std::int64_t size = this->box.size();
+  const int nx = this->box.dims[0];
+  const double bNorm = this->norm(b);
+  if (bNorm == 0.)
+  {
+    std::fill(phi, phi + size, 0.);
+    report.residual = 0.;
+    report.reason = StopReason::Converged;
+    return;
+  }
+  if (!std::isfinite(bNorm))
+  {
+    report.reason = StopReason::NotFinite;
+    report.message = "the source is not finite";
+    return;
+  }
+  const double goal = control.tolerance * bNorm;
+
+  double rNorm = this->residual<T>(b, phi, nullptr, 1.);
+  report.fineApplications += 1.;
+  if (!std::isfinite(rNorm))
+  {
+    report.reason = StopReason::NotFinite;
+    report.message = "the field to start from is not finite";
+    return;
+  }
+  report.residual = rNorm / bNorm;
+  if (rNorm <= goal)
+  {
+    report.reason = StopReason::Converged;
+    return;
+  }
+  if (control.progress && !control.progress(progressBegin))
+  {
+    report.reason = StopReason::Cancelled;
+    return;
+  }
+
+  this->prepareMultigrid();
+  Buffer<float> r(size);
+  Buffer<float> z(size);
+  Buffer<float> p(size);
+  Buffer<float> Ap(size);
+  report.bytes = std::max(report.bytes,
+    this->bytesHeld() + r.bytes() + z.bytes() + p.bytes() + Ap.bytes() +
+      size * static_cast<std::int64_t>(sizeof(double)));
+
+  const double rStart = rNorm;
+  double rScale = rNorm; // r holds the residual divided by it
+  rNorm = this->residual<T>(b, phi, r.data(), rScale);
+  double replaced = rNorm; // the last recomputed norm
+  double best = rNorm;
+  int stalls = 0;
+  double rz = 0.;
+  double alpha = 0.;
+  const auto finish = [&](StopReason reason) {
+    const double last = this->residual<T>(b, phi, nullptr, 1.);
+    report.fineApplications += 1.;
+    report.residual = last / bNorm;
+    report.reason = last <= goal ? StopReason::Converged : reason;
+    if (!std::isfinite(last))
+    {
+      report.reason = StopReason::NotFinite;
+    }
+  };
+
+  for (int iteration = 0;; ++iteration)
+  {
+    if (iteration >= control.maxIterations)
+    {
+      finish(StopReason::MaxIterations);
+      return;
+    }
+    // 1. z = B r
+    this->multigrid.cycle(r.data(), z.data(), this->parallelFor);
+    report.fineApplications += 1. + 2. * this->multigrid.sweeps;
+    // 2. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
+    //    since a cycle in float is not quite linear
+    double rzNew = 0.;
+    double zAp = 0.;
+    {
+      std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()));
+      ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t row = begin; row < end; ++row)
+        {
+          twoDots(nx, z.data() + row * nx, r.data() + row * nx, Ap.data() + row * nx,
+            partial.data() + 2 * row);
+        }
+      });
+      for (std::size_t i = 0; i < partial.size(); i += 2)
+      {
+        rzNew += partial[i];
+        zAp += partial[i + 1];
+      }
+    }
+    if (!std::isfinite(rzNew) || !(rzNew > 0.))
+    {
+      finish(std::isfinite(rzNew) ? StopReason::Breakdown : StopReason::NotFinite);
+      report.message = "the preconditioned residual is not positive";
+      return;
+    }
+    const double beta = iteration > 0 && rz > 0. ? -alpha * zAp / rz : 0.;
+    rz = rzNew;
+    ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
+      combine((end - begin) * nx, static_cast<float>(beta), z.data() + begin * nx,
+        p.data() + begin * nx);
+    });
+    // 3. alpha = r . z / p . A p
+    const double pAp = Apply(this->A, p.data(), Ap.data(), this->parallelFor);
+    report.fineApplications += 1.;
+    if (!std::isfinite(pAp) || !(pAp > 0.))
+    {
+      finish(std::isfinite(pAp) ? StopReason::Breakdown : StopReason::NotFinite);
+      report.message = "a search direction has no energy";
+      return;
+    }
+    alpha = rz / pAp;
+    // 4. phi += alpha p, r -= alpha A p
+    rNorm = rScale *
+      std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t row) {
+        const std::int64_t o = row * nx;
+        return update(nx, alpha * rScale, static_cast<float>(alpha), p.data() + o, Ap.data() + o,
+          phi + o, r.data() + o);
+      }));
+    ++report.iterations;
+
+    // 5. trust only the recomputed residual, and refresh float's before its rounding shows
+    if (!std::isfinite(rNorm))
+    {
+      finish(StopReason::NotFinite);
+      return;
+    }
+    const bool claims = rNorm <= goal;
+    if (claims || rNorm < 1e-3 * replaced)
+    {
+      const double recurred = rNorm;
+      rScale = recurred;
+      rNorm = this->residual<T>(b, phi, r.data(), rScale);
+      report.fineApplications += 1.;
+      report.residual = rNorm / bNorm;
+      if (rNorm <= goal)
+      {
+        report.reason = StopReason::Converged;
+        return;
+      }
+      if (!std::isfinite(rNorm))
+      {
+        report.reason = StopReason::NotFinite;
+        return;
+      }
+      // Double itself is at its end when the recomputed norm no longer follows.
+      stalls = rNorm > 0.5 * best && recurred < 0.5 * rNorm ? stalls + 1 : 0;
+      best = std::min(best, rNorm);
+      if (stalls >= 3)
+      {
+        report.reason = StopReason::Breakdown;
+        report.message = "the tolerance is below what double precision reaches here";
+        return;
+      }
+      replaced = rNorm;
+    }
+    if (rNorm > 1e8 * rStart)
+    {
+      finish(StopReason::Diverged);
+      return;
+    }
+    if (control.progress)
+    {
+      const double done = std::log(rStart / std::max(rNorm, goal)) /
+        std::log(std::max(rStart / goal, 1. + 1e-9));
+      const double fraction =
+        progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
+      if (!control.progress(fraction))
+      {
+        finish(StopReason::Cancelled);
+        return;
+      }
+    }
+  }
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& report) const
+{
+  const int nx = this->box.dims[0];
+  const double V = this->box.voxelVolume();
+  const std::int64_t size = this->box.size();
+  report.emitted = V * SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
+    double sum = 0.;
+    for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+    {
+      sum += static_cast<double>(q[i]);
+    }
+    return sum;
+  });
+  const Buffer<float>& sinks = this->sinkWithoutShift.empty() ? this->A.s : this->sinkWithoutShift;
+  const double lost =
+    V * this->scale * SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
+      double sum = 0.;
+      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+      {
+        sum += sinks[i] > NoSink ? static_cast<double>(sinks[i]) * phi[i] : 0.;
+      }
+      return sum;
+    });
+  double escaped = 0.;
+  const std::array<int, 3>& n = this->box.dims;
+  for (int d = 0; d < 3; ++d)
+  {
+    for (int side = 0; side < 2; ++side)
+    {
+      const std::vector<float>& out = this->border[d][side];
+      if (out.empty())
+      {
+        continue;
+      }
+      const int u = d == 0 ? 1 : 0;
+      const int v = d == 2 ? 1 : 2;
+      int at[3];
+      at[d] = side ? n[d] - 1 : 0;
+      for (at[v] = 0; at[v] < n[v]; ++at[v])
+      {
+        for (at[u] = 0; at[u] < n[u]; ++at[u])
+        {
+          escaped += static_cast<double>(out[static_cast<std::size_t>(this->borderIndex(d, at))]) *
+            phi[this->box.index(at[0], at[1], at[2])];
+        }
+      }
+    }
+  }
+  report.escaped = escaped * V * this->scale;
+  report.absorbed = lost - report.escaped;
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+bool DiffusionSolver::steadyStateExists(
+  const T* q, bool& singular, DiffusionReport& report) const
+{
+  singular = false;
+  if (this->everySink || (this->anySink && !this->anyWall))
+  {
+    return true;
+  }
+  const auto refuse = [&report](double sum, double magnitude, const std::string& where) {
+    std::ostringstream text;
+    text << "no steady state: " << where
+         << " light is neither absorbed nor can it escape, and its sources sum to " << sum
+         << " instead of 0 (the sum of magnitudes is " << magnitude
+         << "); expected absorption > 0 somewhere, or an open boundary, or sources of both signs "
+            "that cancel";
+    report.reason = StopReason::NoSteadyState;
+    report.message = text.str();
+    return false;
+  };
+  const std::int64_t size = this->box.size();
+  constexpr double balanced = 1e-6; // float sources
+  if (!this->anyWall)
+  {
+    double sum = 0.;
+    double magnitude = 0.;
+    for (std::int64_t i = 0; i < size; ++i)
+    {
+      sum += static_cast<double>(q[i]);
+      magnitude += std::abs(static_cast<double>(q[i]));
+    }
+    const double V = this->box.voxelVolume();
+    singular = true;
+    return std::abs(sum) <= balanced * magnitude || refuse(sum * V, magnitude * V, "here");
+  }
+  // Walls may close a part off: flood each part through its open faces.
+  const std::array<int, 3>& n = this->box.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  std::vector<std::uint8_t> seen(static_cast<std::size_t>(size), 0);
+  std::vector<std::int64_t> front;
+  for (std::int64_t seed = 0; seed < size; ++seed)
+  {
+    if (seen[static_cast<std::size_t>(seed)] || q[seed] == T(0))
+    {
+      continue; // only the parts with a source matter
+    }
+    double sum = 0.;
+    double magnitude = 0.;
+    bool sink = false;
+    seen[static_cast<std::size_t>(seed)] = 1;
+    front.assign(1, seed);
+    while (!front.empty())
+    {
+      const std::int64_t i = front.back();
+      front.pop_back();
+      sum += static_cast<double>(q[i]);
+      magnitude += std::abs(static_cast<double>(q[i]));
+      sink = sink || this->A.s[i] > NoSink;
+      const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>((i / n[0]) % n[1]),
+        static_cast<int>(i / stride[2]) };
+      for (int d = 0; d < 3; ++d)
+      {
+        const auto visit = [&](std::int64_t j) {
+          if (!seen[static_cast<std::size_t>(j)])
+          {
+            seen[static_cast<std::size_t>(j)] = 1;
+            front.push_back(j);
+          }
+        };
+        if (at[d] + 1 < n[d] && this->A.g[d][i] > 0.f)
+        {
+          visit(i + stride[d]);
+        }
+        if (at[d] > 0 && this->A.g[d][i - stride[d]] > 0.f)
+        {
+          visit(i - stride[d]);
+        }
+      }
+    }
+    if (!sink && std::abs(sum) > balanced * magnitude)
+    {
+      const double V = this->box.voxelVolume();
+      std::ostringstream where;
+      where << "in the closed part around voxel (" << seed % n[0] << ", " << (seed / n[0]) % n[1]
+            << ", " << seed / stride[2] << ")";
+      return refuse(sum * V, magnitude * V, where.str());
+    }
+  }
+  return true;
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+DiffusionReport DiffusionSolver::solveSteady(
+  const T* q, double* phi, const DiffusionControl& control)
+{
+  DiffusionReport report;
+  const double began = now();
+  this->setShift(0.);
+  bool singular = false;
+  if (this->steadyStateExists(q, singular, report))
+  {
+    const std::int64_t size = this->box.size();
+    RightHandSide<T> b{ q, 1. / this->scale, nullptr, 0., 0. };
+    if (singular)
+    {
+      double sum = 0.;
+      for (std::int64_t i = 0; i < size; ++i)
+      {
+        sum += static_cast<double>(q[i]);
+      }
+      b.mean = b.qScale * sum / static_cast<double>(size);
+    }
+    this->conjugateGradients(b, phi, control, 0., 1., report);
+    if (singular)
+    {
+      double sum = 0.;
+      for (std::int64_t i = 0; i < size; ++i)
+      {
+        sum += phi[i];
+      }
+      const double mean = sum / static_cast<double>(size);
+      for (std::int64_t i = 0; i < size; ++i)
+      {
+        phi[i] -= mean;
+      }
+    }
+    this->balance(q, phi, report);
+  }
+  report.seconds = now() - began;
+  return report;
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+DiffusionReport DiffusionSolver::stepImplicit(
+  const T* q, double* phi, int steps, double cdt, const DiffusionControl& control)
+{
+  DiffusionReport report;
+  const double began = now();
+  const std::int64_t size = this->box.size();
+  const double shifted = 1. / (cdt * this->scale);
+  if (!std::isfinite(cdt) || !(cdt > 0.) || !std::isfinite(shifted) || shifted > 1e30)
+  {
+    report.message = "the time step c dt is not a positive length";
+    return report;
+  }
+  const RightHandSide<T> steady{ q, 1. / this->scale, nullptr, 0., 0. };
+  const double qNorm = this->norm(steady);
+  this->setShift(shifted);
+  Buffer<double> previous(size);
+  report.reason = StopReason::MaxIterations;
+  for (int step = 0; step < steps; ++step)
+  {
+    std::copy(phi, phi + size, previous.data());
+    const RightHandSide<T> b{ q, 1. / this->scale, previous.data(), shifted, 0. };
+    this->conjugateGradients(b, phi, control, static_cast<double>(step) / steps,
+      static_cast<double>(step + 1) / steps, report);
+    if (report.reason != StopReason::Converged)
+    {
+      break;
+    }
+    report.reason = StopReason::MaxIterations;
+    // b - A phi of the steady equation is shift (phi - previous), up to this step's tolerance
+    const double change =
+      shifted * std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
+        double sum = 0.;
+        for (std::int64_t i = r * this->box.dims[0]; i < (r + 1) * this->box.dims[0]; ++i)
+        {
+          sum += (phi[i] - previous[i]) * (phi[i] - previous[i]);
+        }
+        return sum;
+      }));
+    if (change <= control.tolerance * qNorm)
+    {
+      report.reason = StopReason::Converged;
+      break;
+    }
+  }
+  report.bytes += previous.bytes();
+  this->setShift(0.);
+  const double last = this->residual<T>(steady, phi, nullptr, 1.);
+  report.residual = qNorm > 0. ? last / qNorm : last;
+  this->balance(q, phi, report);
+  report.seconds = now() - began;
+  return report;
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+DiffusionReport DiffusionSolver::stepExplicit(
+  const T* q, double* phi, int steps, double cdt, const DiffusionControl& control)
+{
+  DiffusionReport report;
+  const double began = now();
+  const std::int64_t size = this->box.size();
+  const int nx = this->box.dims[0];
+  // The margin is rounding's: the bound itself is allowed.
+  if (!std::isfinite(cdt) || !(cdt > 0.) || cdt > this->stabilityBound() * (1. + 1e-6))
+  {
+    std::ostringstream text;
+    text << "the explicit step c dt = " << cdt << " is unstable; expected in (0, "
+         << this->stabilityBound() << "] (length; positive fields stay positive up to "
+         << this->positivityBound() << ")";
+    report.message = text.str();
+    return report;
+  }
+  this->setShift(0.);
+  const RightHandSide<T> b{ q, 1. / this->scale, nullptr, 0., 0. };
+  const double qNorm = this->norm(b);
+  Buffer<double> other(size);
+  report.bytes = this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
+  double* from = phi;
+  double* to = other.data();
+  const double step = cdt * this->scale;
+  report.reason = StopReason::MaxIterations;
+  for (int i = 0; i < steps; ++i)
+  {
+    const double rNorm =
+      std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
+        double* LIGHTTRANSPORT_RESTRICT out = to + r * nx;
+        const double* in = from + r * nx;
+        const T* source = q + r * nx;
+        applyDouble(doubleRow(this->A, from, r), out);
+        double sum = 0.;
+        for (int x = 0; x < nx; ++x)
+        {
+          const double v = b.qScale * static_cast<double>(source[x]) - out[x];
+          out[x] = in[x] + step * v;
+          sum += v * v;
+        }
+        return sum;
+      }));
+    std::swap(from, to);
+    ++report.iterations;
+    report.fineApplications += 1.;
+    if (!std::isfinite(rNorm))
+    {
+      report.reason = StopReason::NotFinite;
+      break;
+    }
+    if (qNorm > 0. && rNorm <= control.tolerance * qNorm)
+    {
+      report.reason = StopReason::Converged;
+      break;
+    }
+    if (control.progress && !control.progress(static_cast<double>(i + 1) / steps))
+    {
+      report.reason = StopReason::Cancelled;
+      break;
+    }
+  }
+  if (from != phi)
+  {
+    std::copy(from, from + size, phi);
+  }
+  const double last = this->residual<T>(b, phi, nullptr, 1.);
+  report.residual = qNorm > 0. ? last / qNorm : last;
+  this->balance(q, phi, report);
+  report.seconds = now() - began;
+  return report;
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+void DiffusionSolver::flux(const double* phi, T* E) const
+{
+  const std::array<int, 3>& n = this->box.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  // g = D_f / (h^2 scale): the face's flux is g h scale (phi - phi_next).
+  ForRows(this->parallelFor, this->rows(), this->box.size(),
+    [&](std::int64_t begin, std::int64_t end) {
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
+        for (at[0] = 0; at[0] < n[0]; ++at[0])
+        {
+          const std::int64_t i = at[0] + r * n[0];
+          for (int d = 0; d < 3; ++d)
+          {
+            double low = 0.;
+            double high = 0.;
+            if (at[d] > 0)
+            {
+              low = static_cast<double>(this->A.g[d][i - stride[d]]) * (phi[i - stride[d]] - phi[i]);
+            }
+            else if (!this->border[d][0].empty())
+            {
+              low = -static_cast<double>(
+                      this->border[d][0][static_cast<std::size_t>(this->borderIndex(d, at))]) *
+                phi[i];
+            }
+            if (at[d] + 1 < n[d])
+            {
+              high = static_cast<double>(this->A.g[d][i]) * (phi[i] - phi[i + stride[d]]);
+            }
+            else if (!this->border[d][1].empty())
+            {
+              high = static_cast<double>(
+                       this->border[d][1][static_cast<std::size_t>(this->borderIndex(d, at))]) *
+                phi[i];
+            }
+            E[3 * i + d] =
+              static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
+          }
+        }
+      }
+    });
+}
+
+//------------------------------------------------------------------------------
+#define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
+  template DiffusionReport DiffusionSolver::setMedium<T>(const DiffusionMedium<T>&);               \
+  template DiffusionReport DiffusionSolver::solveSteady<T>(                                        \
+    const T*, double*, const DiffusionControl&);                                                   \
+  template DiffusionReport DiffusionSolver::stepExplicit<T>(                                       \
+    const T*, double*, int, double, const DiffusionControl&);                                      \
+  template DiffusionReport DiffusionSolver::stepImplicit<T>(                                       \
+    const T*, double*, int, double, const DiffusionControl&);                                      \
+  template void DiffusionSolver::flux<T>(const double*, T*) const;
+LIGHTTRANSPORT_INSTANTIATE(float)
+LIGHTTRANSPORT_INSTANTIATE(double)
+#undef LIGHTTRANSPORT_INSTANTIATE
 } // namespace lighttransport

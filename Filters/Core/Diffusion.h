@@ -1,24 +1,205 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
+/**
+ * Diffusion of light on a box of voxels,
+ *
+ *   (1/c) d(phi)/dt = div(D grad phi) - sigma_a phi + q,
+ *
+ * in conservative finite volumes: the flux through a face is
+ * -D_f (phi_n - phi) / h with D_f the harmonic mean of the two voxels' D, so
+ * that the matrix is symmetric, an M-matrix, and power is conserved:
+ * emitted = absorbed + escaped (+ stored, in time).
+ * (Ishimaru 1978, ch. 9; Stam 1995; Murray 2018, sec. 4.1, whose eq. 4.3 has the
+ * sign of grad D . grad phi wrong.)
+ *
+ * Names: D [length], sigma_a [1/length], q [power/length^3], phi [power/length^2],
+ * E = -D grad phi [power/length^2]; c dt is a length.
+ */
 #ifndef LightTransport_Core_Diffusion_h
 #define LightTransport_Core_Diffusion_h
+
+#include "Core/Grid.h"
+#include "Core/Multigrid.h"
+#include "Core/Parallel.h"
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
 
 namespace lighttransport
 {
 /** Why a solver stopped. Only Converged is success. */
 enum class StopReason
 {
-  Converged,
-  MaxIterations,
-  Breakdown,
-  NotFinite,
-  Diverged,
-  Cancelled,
-  NoSteadyState,
-  BadInput
+  Converged,     ///< the recomputed residual is at or below the tolerance
+  MaxIterations, ///< the allowed iterations or steps are used up
+  Breakdown,     ///< no further progress: the tolerance is below what the precision reaches
+  NotFinite,     ///< a value overflowed or was not a number
+  Diverged,      ///< the residual grew
+  Cancelled,     ///< the caller asked to stop
+  NoSteadyState, ///< light is emitted where it can neither be absorbed nor escape
+  BadInput       ///< the message says which
 };
 
 const char* ToString(StopReason reason);
+
+/** What happens at the border, half a spacing beyond the outermost voxel centres. */
+enum class Boundary
+{
+  Robin,    ///< partial current: phi + 2 A D d(phi)/dn = 0
+  ZeroFlux, ///< a mirror: d(phi)/dn = 0
+  Absorbing ///< phi = 0
+};
+
+/**
+ * The diffuse Fresnel reflectance inside a medium whose refractive index is eta
+ * times the outside's: F_dr = 2 int_0^1 F(mu) mu dmu, by quadrature (0 for eta = 1).
+ * Jensen et al. 2001 fit it by -1.440/eta^2 + 0.710/eta + 0.668 + 0.0636 eta.
+ */
+double DiffuseFresnelReflectance(double eta);
+
+/** A = (1 + F_dr) / (1 - F_dr) of the Robin condition. */
+double BoundaryFactor(double eta);
+
+/** What light moves through. The arrays are the caller's and outlive their use. */
+template <class T>
+struct DiffusionMedium
+{
+  Grid grid;
+  const T* D = nullptr;       ///< length; >= 0, 0 is a wall
+  const T* sigma_a = nullptr; ///< 1/length; >= 0; null for none
+  /** Voxels with a value other than 0 are no part of the domain; may be null. */
+  const std::uint8_t* outside = nullptr;
+  Boundary boundary = Boundary::Robin;
+  double refractiveIndexRatio = 1.; ///< of Robin; 1/3 .. 3 is usual
+};
+
+struct DiffusionReport
+{
+  StopReason reason = StopReason::BadInput;
+  std::string message; ///< for a person, where the reason alone does not say all
+  int iterations = 0;
+  /** |b - A phi| / |b|, recomputed in double from phi; in time: of the steady equation. */
+  double residual = 0.;
+  double seconds = 0.; ///< this call, the set-up that it needed included
+  std::int64_t bytes = 0; ///< held while solving, beyond the caller's arrays
+  /** Applications of the operator on the finest grid, or sweeps that cost as much. */
+  double fineApplications = 0.;
+  double emitted = 0.;  ///< power: the integral of q over the domain
+  double absorbed = 0.; ///< power: of sigma_a phi
+  double escaped = 0.;  ///< power through the border
+};
+
+/** Called between iterations with a fraction done in [0, 1]; false cancels. */
+using DiffusionProgress = std::function<bool(double fraction)>;
+
+struct DiffusionControl
+{
+  double tolerance = 1e-8;
+  int maxIterations = 500;
+  DiffusionProgress progress; ///< may be empty
+};
+
+/**
+ * Holds the operator of one medium, its multigrid hierarchy (made at the first
+ * steady or implicit solve) and nothing else; sources and solutions are the
+ * caller's. Throws std::bad_alloc.
+ */
+class DiffusionSolver
+{
+public:
+  explicit DiffusionSolver(ParallelFor parallelFor = SerialFor);
+
+  /**
+   * Reads the medium once, keeps its operator (16 bytes per voxel). Answers
+   * BadInput, and says where, for a D or sigma_a that is negative or not finite.
+   */
+  template <class T>
+  DiffusionReport setMedium(const DiffusionMedium<T>& medium);
+
+  /**
+   * Steady state: conjugate gradients, preconditioned by one multigrid cycle,
+   * with the residual replaced by the recomputed one (van der Vorst and Ye 2000)
+   * every few decades.
+   *
+   *   phi: in, the start (zeros, or an earlier solution); out, the answer reached.
+   */
+  template <class T>
+  DiffusionReport solveSteady(const T* q, double* phi, const DiffusionControl& control);
+
+  /**
+   * Time steps of length c dt (a length > 0) from phi:
+   * forward Euler, whose positivity and stability bounds are below, or backward
+   * Euler (L-stable, positive for any step), each to `tolerance`.
+   */
+  template <class T>
+  DiffusionReport stepExplicit(
+    const T* q, double* phi, int steps, double cdt, const DiffusionControl& control);
+  template <class T>
+  DiffusionReport stepImplicit(
+    const T* q, double* phi, int steps, double cdt, const DiffusionControl& control);
+
+  /** c dt up to which a forward Euler step keeps positive fields positive: 1 / max diagonal. */
+  double positivityBound() const;
+  /** c dt up to which it is stable: 2 / (Gershgorin's bound of the largest eigenvalue). */
+  double stabilityBound() const;
+
+  /** E = -D grad phi at voxel centres, along the grid's axes; E has 3 values per voxel. */
+  template <class T>
+  void flux(const double* phi, T* E) const;
+
+  const Grid& grid() const { return this->box; }
+
+private:
+  /** b = qScale q + shift previous - mean, in the units of the scaled operator. */
+  template <class T>
+  struct RightHandSide
+  {
+    const T* q;
+    double qScale;
+    const double* previous;
+    double shift;
+    double mean;
+  };
+  template <class T>
+  void conjugateGradients(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
+    double progressBegin, double progressEnd, DiffusionReport& report);
+  /** |b - A phi|, and the residual divided by rScale in r where that is asked for. */
+  template <class T>
+  double residual(const RightHandSide<T>& b, const double* phi, float* r, double rScale) const;
+  template <class T>
+  double norm(const RightHandSide<T>& b) const;
+  template <class T>
+  void balance(const T* q, const double* phi, DiffusionReport& report) const;
+  /** False, with a message, where light has nowhere to go; singular: where only -q balances q. */
+  template <class T>
+  bool steadyStateExists(const T* q, bool& singular, DiffusionReport& report) const;
+  /** Adds a constant to all sinks (1 / (c dt) of an implicit step); 0 takes it away. */
+  void setShift(double shift);
+  void prepareMultigrid();
+  std::int64_t bytesHeld() const;
+  std::int64_t rows() const;
+  void boundaryOf(Boundary boundary);
+  std::int64_t borderIndex(int d, const int at[3]) const;
+
+  ParallelFor parallelFor;
+  Grid box;
+  DiffusionOperator A; // divided by `scale`, so that no diagonal is above 1
+  double scale = 1.;   // 1/length
+  double largestDiagonal = 1.;
+  double gershgorin = 1.; // bound of the largest eigenvalue, divided by scale
+  bool anySink = false;
+  bool everySink = false;
+  bool anyWall = false;
+  /** Conductance through the border, divided by scale: [axis][low, high], a value per face. */
+  std::array<std::array<std::vector<float>, 2>, 3> border;
+  double shift = 0.;
+  Buffer<float> sinkWithoutShift; // while shift is not 0
+  Multigrid multigrid;
+  bool multigridReady = false;
+};
 } // namespace lighttransport
 
 #endif

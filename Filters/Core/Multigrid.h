@@ -1,0 +1,105 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * The discrete diffusion operator and a multigrid cycle that approximates its
+ * inverse.
+ *
+ * The operator acts on one value per voxel of a box:
+ *
+ *   (A x)_i = sum over the six neighbours j of g_ij (x_i - x_j)  +  s_i x_i
+ *
+ * with conductances g_ij = g_ji >= 0 on the faces and a sink s_i >= 0 (absorption
+ * and what leaves through the border): a symmetric M-matrix. Keeping the sink
+ * apart from the diagonal, instead of the diagonal itself, keeps every small
+ * eigenvalue exact to rounding: nothing is ever subtracted from the conductances.
+ *
+ * The hierarchy follows the physics, not the algebra:
+ *   1. Coarsening joins 2 voxels along each axis whose mean conductance is within
+ *      a factor of the largest one (so strong anisotropy is semi-coarsened).
+ *   2. A coarse face is a network of resistors: each line through it goes from
+ *      centre to centre (half the inner face on either side, in series with the
+ *      face between), and the lines stand in parallel. The coarse operator keeps
+ *      seven points.
+ *   3. The prolongation puts a voxel between its parent and its parent's
+ *      neighbour by the balance of flux along the line that joins them; the
+ *      restriction is its transpose.
+ *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after
+ *      the coarse correction, so that the cycle is symmetric and positive definite.
+ *
+ * Alcouffe, Brandt, Dendy and Painter 1981 (SIAM J. Sci. Stat. Comput. 2, 430)
+ * introduced conductance-weighted transfers for strongly varying coefficients.
+ */
+#ifndef LightTransport_Core_Multigrid_h
+#define LightTransport_Core_Multigrid_h
+
+#include "Core/Buffer.h"
+#include "Core/Parallel.h"
+
+#include <array>
+#include <cstdint>
+#include <deque>
+
+namespace lighttransport
+{
+/** One grid of the hierarchy: A's coefficients there. */
+struct DiffusionOperator
+{
+  std::array<int, 3> dims{ { 0, 0, 0 } };
+  /** g[d][i]: the face between voxel i and its next along axis d; 0 on the last. */
+  std::array<Buffer<float>, 3> g;
+  Buffer<float> s;
+  Buffer<float> zeros; // a row, read in place of rows outside
+
+  std::int64_t size() const
+  {
+    return static_cast<std::int64_t>(this->dims[0]) * this->dims[1] * this->dims[2];
+  }
+  void allocate(const std::array<int, 3>& n);
+  std::int64_t bytes() const;
+};
+
+/** Gives a voxel with neither face nor sink the sink `s`, so that nothing divides by zero. */
+void CloseIsolated(DiffusionOperator& A, float s, const ParallelFor& parallelFor);
+
+/** y = A x and returns x . y; in float, with the sum in double. */
+double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor);
+
+class Multigrid
+{
+public:
+  /** Builds the hierarchy for A, which must outlive it. */
+  void setup(const DiffusionOperator& A, const ParallelFor& parallelFor);
+  void release();
+
+  /**
+   * One V-cycle from zero: x ~ A^-1 b. Both have a value per voxel of A, with
+   * one readable value before and after (Buffer has that).
+   */
+  void cycle(const float* b, float* x, const ParallelFor& parallelFor);
+
+  /** Smoothing sweeps before and after each coarse correction; default 1. */
+  int sweeps = 1;
+
+  std::int64_t bytes() const;
+  int numberOfLevels() const { return static_cast<int>(this->levels.size()) + 1; }
+
+private:
+  struct Level
+  {
+    DiffusionOperator A; // empty on the finest, which is the caller's
+    Buffer<float> x, b;  // empty on the finest: the caller's
+    Buffer<float> r;     // residual, where there is a coarser level
+    std::array<bool, 3> halved{ { false, false, false } };
+    std::array<Buffer<std::uint8_t>, 3> w; // weight of the parent's neighbour, /255
+  };
+  void cycle(std::size_t l, const DiffusionOperator& A, const float* b, float* x,
+    const ParallelFor& parallelFor);
+  void coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
+    const ParallelFor& parallelFor) const;
+
+  const DiffusionOperator* finest = nullptr;
+  std::deque<Level> levels;
+};
+} // namespace lighttransport
+
+#endif
