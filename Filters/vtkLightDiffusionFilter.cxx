@@ -3,13 +3,752 @@
 #include "vtkLightDiffusionFilter.h"
 
 #include "Core/Diffusion.h"
+#include "vtkLightTransportArrays.h"
+#include "vtkLightTransportInternal.h"
+#include "vtkOpticalMediumFilter.h"
 
+#include "vtkCellData.h"
+#include "vtkDataArrayRange.h"
+#include "vtkDataSetAttributes.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkMatrix3x3.h"
+#include "vtkNew.h"
 #include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUnsignedCharArray.h"
+#include "vtkWeakPointer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <sstream>
+#include <vector>
 
 vtkStandardNewMacro(vtkLightDiffusionFilter);
+
+namespace
+{
+static_assert(static_cast<int>(lighttransport::StopReason::BadInput) ==
+    vtkLightDiffusionFilter::BadInput,
+  "the filter's reasons are the core's");
+static_assert(static_cast<int>(lighttransport::Boundary::Absorbing) ==
+    vtkLightDiffusionFilter::Absorbing,
+  "the filter's boundaries are the core's");
+
+/** What the operator was made of: enough to tell whether it still holds. */
+struct MediumKey
+{
+  vtkWeakPointer<vtkDataArray> arrays[3];
+  vtkMTimeType times[3] = { 0, 0, 0 };
+  int dims[3] = { 0, 0, 0 };
+  double spacing[3] = { 0., 0., 0. };
+  int boundary = -1;
+  double refractiveIndexRatio = 0.;
+
+  void setArray(int i, vtkDataArray* array)
+  {
+    this->arrays[i] = array;
+    this->times[i] = array ? array->GetMTime() : 0;
+  }
+  bool operator==(const MediumKey& other) const
+  {
+    for (int i = 0; i < 3; ++i)
+    {
+      if (this->arrays[i] != other.arrays[i] || this->times[i] != other.times[i] ||
+        this->dims[i] != other.dims[i] || this->spacing[i] != other.spacing[i])
+      {
+        return false;
+      }
+    }
+    return this->boundary == other.boundary &&
+      this->refractiveIndexRatio == other.refractiveIndexRatio;
+  }
+};
+
+/** The array's values as they lie in memory, or converted where their type is another. */
+template <class T, class ArrayT>
+const T* valuesOf(vtkDataArray* array, std::vector<T>& converted)
+{
+  if (auto typed = ArrayT::FastDownCast(array))
+  {
+    return typed->GetPointer(0);
+  }
+  converted.resize(static_cast<std::size_t>(array->GetNumberOfTuples()));
+  const auto range = vtk::DataArrayValueRange<1>(array);
+  std::transform(range.begin(), range.end(), converted.begin(),
+    [](double value) { return static_cast<T>(value); });
+  return converted.data();
+}
+} // namespace
+
+//------------------------------------------------------------------------------
+struct vtkLightDiffusionFilter::State
+{
+  State()
+    : solver(vtkLightTransportParallelFor())
+  {
+  }
+
+  lighttransport::DiffusionSolver solver;
+  MediumKey key;
+  bool valid = false;                 // the solver's operator is that of the key
+  lighttransport::Buffer<double> phi; // the last state, where Continue asks for it
+  // of AnisotropicDiffusion, made from the scalars
+  vtkNew<vtkOpticalMediumFilter> conductance;
+  MediumKey scalarsKey;
+};
+
+//------------------------------------------------------------------------------
+vtkLightDiffusionFilter::vtkLightDiffusionFilter()
+  : Kept(new State)
+{
+  this->SetInputArrayToProcess(
+    0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+}
+
+vtkLightDiffusionFilter::~vtkLightDiffusionFilter() = default;
+
+//------------------------------------------------------------------------------
+void vtkLightDiffusionFilter::ResetState()
+{
+  if (!this->Kept->phi.empty())
+  {
+    this->Kept->phi.release();
+    this->Modified();
+  }
+}
+
+//------------------------------------------------------------------------------
+int vtkLightDiffusionFilter::FillInputPortInformation(int, vtkInformation* info)
+{
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  return 1;
+}
+
+int vtkLightDiffusionFilter::RequestInformation(
+  vtkInformation*, vtkInformationVector** inputVector, vtkInformationVector* outputVector)
+{
+  // Light reaches everywhere: the whole image is asked for and made.
+  vtkInformation* in = inputVector[0]->GetInformationObject(0);
+  int whole[6] = { 0, -1, 0, -1, 0, -1 };
+  in->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  outputVector->GetInformationObject(0)->Set(
+    vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole, 6);
+  return 1;
+}
+
+int vtkLightDiffusionFilter::RequestUpdateExtent(
+  vtkInformation*, vtkInformationVector** inputVector, vtkInformationVector* outputVector)
+{
+  vtkInformation* in = inputVector[0]->GetInformationObject(0);
+  int whole[6] = { 0, -1, 0, -1, 0, -1 };
+  in->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), whole, 6);
+  vtkInformation* out = outputVector->GetInformationObject(0);
+  out->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), whole, 6);
+  return 1;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightDiffusionFilter::ClearReport()
+{
+  this->StopReason = BadInput;
+  this->Message.clear();
+  this->NumberOfIterationsUsed = 0;
+  this->Residual = 0.;
+  this->SolveSeconds = 0.;
+  this->Bytes = 0;
+  this->FineGridApplications = 0.;
+  this->EmittedPower = this->AbsorbedPower = this->EscapedPower = 0.;
+  this->PositivityBound = this->StabilityBound = this->UsedTimeStep = 0.;
+  this->ComputedGradientScale = 0.;
+}
+
+//------------------------------------------------------------------------------
+bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
+{
+  std::ostringstream text;
+  if (this->Model != Diffusion && this->Model != AnisotropicDiffusion)
+  {
+    text << "Model is " << this->Model << "; expected Diffusion or AnisotropicDiffusion";
+  }
+  else if (this->Mode != Steady && this->Mode != Explicit && this->Mode != Implicit)
+  {
+    text << "Mode is " << this->Mode << "; expected Steady, Explicit or Implicit";
+  }
+  else if (this->Model == AnisotropicDiffusion && this->Mode == Steady)
+  {
+    text << "Mode is Steady with the model AnisotropicDiffusion, which has no absorption and ends "
+            "in a constant; expected Explicit or Implicit with a bounded NumberOfSteps";
+  }
+  else if (this->Boundary != Robin && this->Boundary != ZeroFlux && this->Boundary != Absorbing)
+  {
+    text << "Boundary is " << this->Boundary << "; expected Robin, ZeroFlux or Absorbing";
+  }
+  else if (this->FluxFunction != Exponential && this->FluxFunction != Rational)
+  {
+    text << "FluxFunction is " << this->FluxFunction << "; expected Exponential or Rational";
+  }
+  else if (!std::isfinite(this->Tolerance) || this->Tolerance <= 0. || this->Tolerance >= 1.)
+  {
+    text << "Tolerance is " << this->Tolerance << "; expected a number in (0, 1)";
+  }
+  else if (this->MaximumNumberOfIterations < 1)
+  {
+    text << "MaximumNumberOfIterations is " << this->MaximumNumberOfIterations
+         << "; expected at least 1";
+  }
+  else if (this->Mode != Steady && this->NumberOfSteps < 1)
+  {
+    text << "NumberOfSteps is " << this->NumberOfSteps << "; expected at least 1";
+  }
+  else if (!std::isfinite(this->CourantNumber) || this->CourantNumber <= 0.)
+  {
+    text << "CourantNumber is " << this->CourantNumber << "; expected a number > 0";
+  }
+  else if (!std::isfinite(this->TimeStep) || this->TimeStep < 0.)
+  {
+    text << "TimeStep is " << this->TimeStep << "; expected a length >= 0 (0: from CourantNumber)";
+  }
+  else if (!std::isfinite(this->RefractiveIndexRatio) || this->RefractiveIndexRatio <= 0.)
+  {
+    text << "RefractiveIndexRatio is " << this->RefractiveIndexRatio << "; expected a number > 0";
+  }
+  else if (!std::isfinite(this->GradientScale) || this->GradientScale < 0.)
+  {
+    text << "GradientScale is " << this->GradientScale
+         << "; expected a number >= 0 (0: chosen from the data)";
+  }
+  else if (this->OutputPrecision != SINGLE_PRECISION && this->OutputPrecision != DOUBLE_PRECISION &&
+    this->OutputPrecision != DEFAULT_PRECISION)
+  {
+    text << "OutputPrecision is " << this->OutputPrecision
+         << "; expected SINGLE_PRECISION or DOUBLE_PRECISION";
+  }
+  problem = text.str();
+  return problem.empty();
+}
+
+//------------------------------------------------------------------------------
+int vtkLightDiffusionFilter::RequestData(
+  vtkInformation*, vtkInformationVector** inputVector, vtkInformationVector* outputVector)
+{
+  vtkImageData* input = vtkImageData::GetData(inputVector[0]);
+  vtkImageData* output = vtkImageData::GetData(outputVector);
+  this->ClearReport();
+  std::string problem;
+  bool ok = false;
+  if (!input)
+  {
+    problem = "there is no input; expected an image";
+  }
+  else
+  {
+    try
+    {
+      ok = this->CheckParameters(problem) && this->Execute(input, output, problem);
+    }
+    catch (const std::bad_alloc&)
+    {
+      const double megabytes = 64e-6 * static_cast<double>(input->GetNumberOfPoints());
+      std::ostringstream text;
+      text << "not enough memory to solve on " << input->GetNumberOfPoints()
+           << " points; expected about " << std::ceil(megabytes)
+           << " MB free. Solve on a coarser image (vtkImageResample) or on a part of it "
+              "(vtkExtractVOI)";
+      problem = text.str();
+      this->Kept.reset(new State);
+    }
+  }
+  if (!ok)
+  {
+    this->Message = problem;
+    output->Initialize();
+    vtkErrorMacro(<< problem);
+    return 0;
+  }
+  return 1;
+}
+
+//------------------------------------------------------------------------------
+bool vtkLightDiffusionFilter::Execute(
+  vtkImageData* input, vtkImageData* output, std::string& problem)
+{
+  namespace names = vtkLightTransportArrays;
+  using lighttransport::DiffusionReport;
+  State& kept = *this->Kept;
+
+  // 1. check the input
+  std::ostringstream text;
+  const vtkIdType size = input->GetNumberOfPoints();
+  if (size < 1)
+  {
+    problem = "the image is empty; expected at least one point";
+    return false;
+  }
+  double spacing[3];
+  input->GetSpacing(spacing);
+  for (const double s : spacing)
+  {
+    if (!std::isfinite(s) || s <= 0.)
+    {
+      text << "the spacing is (" << spacing[0] << ", " << spacing[1] << ", " << spacing[2]
+           << "); expected three lengths > 0";
+      problem = text.str();
+      return false;
+    }
+  }
+  const bool anisotropic = this->Model == AnisotropicDiffusion;
+  const auto find = [&](vtkImageData* image, const char* name) -> vtkDataArray* {
+    vtkDataArray* array = image->GetPointData()->GetArray(name);
+    if (!array)
+    {
+      text << "the point array " << name << " is missing";
+      if (image->GetCellData()->GetArray(name))
+      {
+        text << " (a cell array has that name)";
+      }
+      text << "; expected one of "
+           << (std::string(name) == names::Source ? "vtkLightSeedFilter" : "vtkOpticalMediumFilter");
+    }
+    else if (array->GetNumberOfComponents() != 1 || array->GetNumberOfTuples() != size)
+    {
+      text << "the point array " << name << " has " << array->GetNumberOfTuples() << " tuples of "
+           << array->GetNumberOfComponents() << " components; expected " << size << " of 1";
+      array = nullptr;
+    }
+    problem = text.str();
+    return array;
+  };
+  vtkDataArray* source = find(input, names::Source);
+  if (!source)
+  {
+    return false;
+  }
+  vtkDataArray* D = nullptr;
+  vtkDataArray* sigma_a = nullptr;
+  if (anisotropic)
+  {
+    // The conductance is the gradient mapping of the static scalars, with their own filter.
+    vtkDataArray* scalars = this->GetInputArrayToProcess(0, input);
+    if (!scalars || !scalars->GetName())
+    {
+      problem = "AnisotropicDiffusion found no named point scalars; expected the volume whose "
+                "gradient guides the light (SetInputArrayToProcess)";
+      return false;
+    }
+    vtkOpticalMediumFilter* medium = kept.conductance;
+    MediumKey scalarsKey;
+    scalarsKey.setArray(0, scalars);
+    scalarsKey.setArray(1, input->GetPointGhostArray());
+    input->GetDimensions(scalarsKey.dims);
+    std::copy(spacing, spacing + 3, scalarsKey.spacing);
+    if (!(scalarsKey == kept.scalarsKey))
+    {
+      vtkNew<vtkImageData> volume;
+      volume->CopyStructure(input);
+      volume->GetPointData()->SetScalars(scalars);
+      if (vtkUnsignedCharArray* hiding = input->GetPointGhostArray())
+      {
+        volume->GetPointData()->AddArray(hiding);
+      }
+      medium->SetInputData(volume);
+      kept.scalarsKey = scalarsKey;
+    }
+    medium->SetDiffusionMapping(vtkOpticalMediumFilter::FromScalarGradient);
+    medium->SetGradientFunction(this->FluxFunction == Rational
+        ? vtkOpticalMediumFilter::Rational
+        : vtkOpticalMediumFilter::Exponential);
+    medium->SetGradientScale(this->GradientScale);
+    medium->Update();
+    this->ComputedGradientScale = medium->GetComputedGradientScale();
+    D = medium->GetOutput()->GetPointData()->GetArray(names::DiffusionCoefficient);
+    if (!D)
+    {
+      problem = "no conductance could be made from the scalars";
+      return false;
+    }
+  }
+  else
+  {
+    D = find(input, names::DiffusionCoefficient);
+    sigma_a = D ? find(input, names::Absorption) : nullptr;
+    if (!sigma_a)
+    {
+      return false;
+    }
+  }
+  vtkUnsignedCharArray* ghosts = input->GetPointGhostArray();
+  std::vector<std::uint8_t> outside;
+  if (ghosts && ghosts->GetNumberOfTuples() == size)
+  {
+    constexpr unsigned char hidden = vtkDataSetAttributes::HIDDENPOINT;
+    for (vtkIdType i = 0; i < size; ++i)
+    {
+      if (ghosts->GetValue(i) & hidden)
+      {
+        outside.resize(static_cast<std::size_t>(size), 0);
+        outside[static_cast<std::size_t>(i)] = 1;
+      }
+    }
+  }
+
+  // Double sources stay double; all others are float.
+  const bool doubleSource = source->GetDataType() != VTK_FLOAT;
+  std::vector<float> floatStore;
+  std::vector<double> doubleStore;
+  const float* qFloat = nullptr;
+  const double* qDouble = nullptr;
+  if (doubleSource)
+  {
+    qDouble = valuesOf<double, vtkDoubleArray>(source, doubleStore);
+  }
+  else
+  {
+    qFloat = valuesOf<float, vtkFloatArray>(source, floatStore);
+  }
+  double largest = 0.;
+  for (vtkIdType i = 0; i < size; ++i)
+  {
+    const double q = doubleSource ? qDouble[i] : static_cast<double>(qFloat[i]);
+    if (!std::isfinite(q))
+    {
+      int dims[3];
+      input->GetDimensions(dims);
+      const int* extent = input->GetExtent();
+      text << "the source is " << q << " at voxel (" << extent[0] + i % dims[0] << ", "
+           << extent[2] + (i / dims[0]) % dims[1] << ", "
+           << extent[4] + i / (static_cast<vtkIdType>(dims[0]) * dims[1])
+           << "); expected finite values (power/length^3)";
+      problem = text.str();
+      return false;
+    }
+    largest = std::max(largest, std::abs(q));
+  }
+  if (largest > 1e100)
+  {
+    text << "the source reaches " << largest << " power/length^3; expected at most 1e100";
+    problem = text.str();
+    return false;
+  }
+  if (!outside.empty())
+  {
+    // Light does not start outside the domain.
+    if (doubleSource)
+    {
+      doubleStore.assign(qDouble, qDouble + size);
+      qDouble = doubleStore.data();
+    }
+    else
+    {
+      floatStore.assign(qFloat, qFloat + size);
+      qFloat = floatStore.data();
+    }
+    for (std::size_t i = 0; i < outside.size(); ++i)
+    {
+      if (outside[i] && doubleSource)
+      {
+        doubleStore[i] = 0.;
+      }
+      else if (outside[i])
+      {
+        floatStore[i] = 0.f;
+      }
+    }
+  }
+
+  // 2. the operator, unless the last one still holds
+  MediumKey key;
+  key.setArray(0, D);
+  key.setArray(1, sigma_a);
+  key.setArray(2, ghosts);
+  input->GetDimensions(key.dims);
+  std::copy(spacing, spacing + 3, key.spacing);
+  key.boundary = this->Boundary;
+  key.refractiveIndexRatio = this->RefractiveIndexRatio;
+  double setupSeconds = 0.;
+  if (!kept.valid || !(key == kept.key))
+  {
+    kept.valid = false;
+    kept.phi.release();
+    const auto build = [&](auto zero, const auto* d, const auto* s) {
+      lighttransport::DiffusionMedium<decltype(zero)> medium;
+      medium.grid.dims = { { key.dims[0], key.dims[1], key.dims[2] } };
+      medium.grid.spacing = { { spacing[0], spacing[1], spacing[2] } };
+      medium.D = d;
+      medium.sigma_a = s;
+      medium.outside = outside.empty() ? nullptr : outside.data();
+      medium.boundary = static_cast<lighttransport::Boundary>(this->Boundary);
+      medium.refractiveIndexRatio = this->RefractiveIndexRatio;
+      return kept.solver.setMedium(medium);
+    };
+    DiffusionReport report;
+    if (D->GetDataType() == VTK_FLOAT && (!sigma_a || sigma_a->GetDataType() == VTK_FLOAT))
+    {
+      std::vector<float> unused;
+      report = build(0.f, valuesOf<float, vtkFloatArray>(D, unused),
+        sigma_a ? valuesOf<float, vtkFloatArray>(sigma_a, unused) : nullptr);
+    }
+    else
+    {
+      std::vector<double> storeD;
+      std::vector<double> storeSigma;
+      report = build(0., valuesOf<double, vtkDoubleArray>(D, storeD),
+        sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, storeSigma) : nullptr);
+    }
+    if (report.reason != lighttransport::StopReason::Converged)
+    {
+      problem = report.message;
+      return false;
+    }
+    setupSeconds = report.seconds;
+    kept.key = key;
+    kept.valid = true;
+  }
+  this->PositivityBound = kept.solver.positivityBound();
+  this->StabilityBound = kept.solver.stabilityBound();
+
+  // 3. solve
+  lighttransport::Buffer<double> phi;
+  if (this->Continue && kept.phi.size() == size)
+  {
+    phi = std::move(kept.phi);
+  }
+  else
+  {
+    phi.allocate(size);
+    if (anisotropic)
+    {
+      for (vtkIdType i = 0; i < size; ++i)
+      {
+        phi[i] = doubleSource ? qDouble[i] : static_cast<double>(qFloat[i]);
+      }
+    }
+  }
+  kept.phi.release();
+  lighttransport::DiffusionControl control;
+  control.tolerance = this->Tolerance;
+  control.maxIterations = this->MaximumNumberOfIterations;
+  control.progress = [this](double fraction) {
+    this->UpdateProgress(fraction);
+    return !this->GetAbortExecute();
+  };
+  this->UsedTimeStep = this->Mode == Steady ? 0.
+    : this->TimeStep > 0.                   ? this->TimeStep
+                                            : this->CourantNumber * this->PositivityBound;
+  const auto solve = [&](const auto* q) {
+    switch (this->Mode)
+    {
+      case Explicit:
+        return kept.solver.stepExplicit(
+          q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
+      case Implicit:
+        return kept.solver.stepImplicit(
+          q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
+      default:
+        return kept.solver.solveSteady(q, phi.data(), control);
+    }
+  };
+  DiffusionReport report;
+  if (anisotropic)
+  {
+    report = solve(static_cast<const float*>(nullptr));
+  }
+  else
+  {
+    report = doubleSource ? solve(qDouble) : solve(qFloat);
+  }
+  this->StopReason = static_cast<int>(report.reason);
+  this->Message = report.message;
+  this->NumberOfIterationsUsed = report.iterations;
+  this->Residual = report.residual;
+  this->SolveSeconds = report.seconds + setupSeconds;
+  this->Bytes = static_cast<vtkIdType>(report.bytes);
+  this->FineGridApplications = report.fineApplications;
+  this->EmittedPower = report.emitted;
+  this->AbsorbedPower = report.absorbed;
+  this->EscapedPower = report.escaped;
+
+  const bool usable = this->StopReason == Converged || this->StopReason == MaxIterations ||
+    this->StopReason == Breakdown || this->StopReason == Cancelled;
+  if (!usable)
+  {
+    text << this->GetStopReasonAsString() << " after " << this->NumberOfIterationsUsed
+         << " iterations";
+    problem = report.message.empty() ? text.str() : report.message;
+    return false;
+  }
+  const bool stepsDone = this->Mode != Steady && this->StopReason == MaxIterations &&
+    (this->Mode == Explicit || report.message.empty());
+  if (this->StopReason == Breakdown || (this->StopReason == MaxIterations && !stepsDone))
+  {
+    vtkWarningMacro(<< this->GetStopReasonAsString() << " after " << this->NumberOfIterationsUsed
+                    << " iterations: the relative residual is " << this->Residual
+                    << " instead of <= " << this->Tolerance
+                    << (report.message.empty() ? "" : " (") << report.message
+                    << (report.message.empty() ? "" : ")") << "; the best answer is kept");
+  }
+
+  // 4. the arrays
+  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION;
+  double extreme = 0.;
+  for (vtkIdType i = 0; i < size; ++i)
+  {
+    extreme = std::max(extreme, std::abs(phi[i]));
+  }
+  if (!toDouble && extreme > static_cast<double>(std::numeric_limits<float>::max()))
+  {
+    text << "the fluence reaches " << extreme
+         << ", which float cannot hold; expected OutputPrecision = DOUBLE_PRECISION, or less power";
+    problem = text.str();
+    return false;
+  }
+  output->ShallowCopy(input);
+  vtkSmartPointer<vtkDataArray> fluence;
+  if (toDouble)
+  {
+    vtkNew<vtkDoubleArray> array;
+    array->SetNumberOfTuples(size);
+    std::copy(phi.data(), phi.data() + size, array->GetPointer(0));
+    fluence = array;
+  }
+  else
+  {
+    vtkNew<vtkFloatArray> array;
+    array->SetNumberOfTuples(size);
+    std::transform(phi.data(), phi.data() + size, array->GetPointer(0),
+      [](double value) { return static_cast<float>(value); });
+    fluence = array;
+  }
+  fluence->SetName(names::Fluence);
+  output->GetPointData()->AddArray(fluence);
+  if (this->ComputeFlux)
+  {
+    const auto write = [&](auto* array) {
+      array->SetName(names::Flux);
+      array->SetNumberOfComponents(3);
+      array->SetNumberOfTuples(size);
+      auto* E = array->GetPointer(0);
+      kept.solver.flux(phi.data(), E);
+      vtkMatrix3x3* direction = input->GetDirectionMatrix();
+      if (!direction->IsIdentity())
+      {
+        using Value = std::remove_pointer_t<decltype(E)>;
+        for (vtkIdType i = 0; i < size; ++i)
+        {
+          const double along[3] = { static_cast<double>(E[3 * i]), static_cast<double>(E[3 * i + 1]),
+            static_cast<double>(E[3 * i + 2]) };
+          double world[3];
+          direction->MultiplyPoint(along, world);
+          for (int d = 0; d < 3; ++d)
+          {
+            E[3 * i + d] = static_cast<Value>(world[d]);
+          }
+        }
+      }
+      output->GetPointData()->AddArray(array);
+    };
+    if (toDouble)
+    {
+      write(vtkSmartPointer<vtkDoubleArray>::New().Get());
+    }
+    else
+    {
+      write(vtkSmartPointer<vtkFloatArray>::New().Get());
+    }
+  }
+  output->GetPointData()->SetActiveScalars(names::Fluence);
+  this->WriteReport(output);
+  if (this->Continue)
+  {
+    kept.phi = std::move(phi);
+  }
+  return true;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightDiffusionFilter::WriteReport(vtkImageData* output) const
+{
+  vtkFieldData* field = output->GetFieldData();
+  const auto name = [](const char* what) { return std::string("LightDiffusionReport.") + what; };
+  const auto number = [&](const char* what, double value) {
+    vtkNew<vtkDoubleArray> array;
+    array->SetName(name(what).c_str());
+    array->InsertNextValue(value);
+    field->AddArray(array);
+  };
+  const auto word = [&](const char* what, const char* value) {
+    vtkNew<vtkStringArray> array;
+    array->SetName(name(what).c_str());
+    array->InsertNextValue(value);
+    field->AddArray(array);
+  };
+  static const char* const models[] = { "Diffusion", "AnisotropicDiffusion" };
+  static const char* const modes[] = { "Steady", "Explicit", "Implicit" };
+  static const char* const boundaries[] = { "Robin", "ZeroFlux", "Absorbing" };
+  word("Model", models[this->Model]);
+  word("Mode", modes[this->Mode]);
+  word("Boundary", boundaries[this->Boundary]);
+  number("RefractiveIndexRatio", this->RefractiveIndexRatio);
+  number("Tolerance", this->Tolerance);
+  number("TimeStep", this->UsedTimeStep);
+  word("StopReason", this->GetStopReasonAsString());
+  word("Message", this->Message.c_str());
+  number("Iterations", this->NumberOfIterationsUsed);
+  number("Residual", this->Residual);
+  number("Seconds", this->SolveSeconds);
+  number("Bytes", static_cast<double>(this->Bytes));
+  number("EmittedPower", this->EmittedPower);
+  number("AbsorbedPower", this->AbsorbedPower);
+  number("EscapedPower", this->EscapedPower);
+}
+
+//------------------------------------------------------------------------------
+const char* vtkLightDiffusionFilter::GetStopReasonAsString() const
+{
+  return lighttransport::ToString(static_cast<lighttransport::StopReason>(this->StopReason));
+}
 
 //------------------------------------------------------------------------------
 void vtkLightDiffusionFilter::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
+  os << indent << "Model: " << this->Model << "\n";
+  os << indent << "Mode: " << this->Mode << "\n";
+  os << indent << "Boundary: " << this->Boundary << "\n";
+  os << indent << "RefractiveIndexRatio: " << this->RefractiveIndexRatio << "\n";
+  os << indent << "Tolerance: " << this->Tolerance << "\n";
+  os << indent << "MaximumNumberOfIterations: " << this->MaximumNumberOfIterations << "\n";
+  os << indent << "NumberOfSteps: " << this->NumberOfSteps << "\n";
+  os << indent << "CourantNumber: " << this->CourantNumber << "\n";
+  os << indent << "TimeStep: " << this->TimeStep << "\n";
+  os << indent << "FluxFunction: " << this->FluxFunction << "\n";
+  os << indent << "GradientScale: " << this->GradientScale << "\n";
+  os << indent << "ComputedGradientScale: " << this->ComputedGradientScale << "\n";
+  os << indent << "ComputeFlux: " << this->ComputeFlux << "\n";
+  os << indent << "Continue: " << this->Continue << "\n";
+  os << indent << "OutputPrecision: " << this->OutputPrecision << "\n";
+  os << indent << "StopReason: " << this->GetStopReasonAsString() << "\n";
+  os << indent << "Message: " << this->Message << "\n";
+  os << indent << "NumberOfIterationsUsed: " << this->NumberOfIterationsUsed << "\n";
+  os << indent << "Residual: " << this->Residual << "\n";
+  os << indent << "SolveSeconds: " << this->SolveSeconds << "\n";
+  os << indent << "Bytes: " << this->Bytes << "\n";
+  os << indent << "FineGridApplications: " << this->FineGridApplications << "\n";
+  os << indent << "EmittedPower: " << this->EmittedPower << "\n";
+  os << indent << "AbsorbedPower: " << this->AbsorbedPower << "\n";
+  os << indent << "EscapedPower: " << this->EscapedPower << "\n";
+  os << indent << "PositivityBound: " << this->PositivityBound << "\n";
+  os << indent << "StabilityBound: " << this->StabilityBound << "\n";
+  os << indent << "UsedTimeStep: " << this->UsedTimeStep << "\n";
 }

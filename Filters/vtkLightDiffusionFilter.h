@@ -1,10 +1,67 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class   vtkLightDiffusionFilter
+ * @brief   diffuse light through an image: its fluence, and on request its flux
+ *
+ * Input: an image with the point arrays of vtkOpticalMediumFilter and
+ * vtkLightSeedFilter (names in vtkLightTransportArrays.h),
+ *
+ *   DiffusionCoefficient  D        length          >= 0; 0 is a wall
+ *   Absorption            sigma_a  1/length        >= 0
+ *   Source                q        power/length^3  either sign
+ *
+ * Output: the same image, its arrays passed through, with
+ *
+ *   Fluence  phi              power/length^2  either sign where a source is negative
+ *   Flux     E = -D grad phi  power/length^2  three world components, on request
+ *
+ * which solves
+ *
+ *   (1/c) d(phi)/dt = div(D grad phi) - sigma_a phi + q.
+ *
+ * "length" is the unit of the image's spacing. Image points are voxel centres;
+ * the domain ends half a spacing beyond the outermost. An axis with a single
+ * point carries no flux: the image is taken as invariant along it. Hidden points
+ * (vtkGhostType) are no part of the domain: light neither enters nor starts there.
+ *
+ * Stages, as in the code:
+ *   1. check the input;
+ *   2. build the operator: conservative finite volumes, harmonic means of D on the
+ *      faces (a symmetric M-matrix: emitted = absorbed + escaped); kept until the
+ *      medium changes;
+ *   3. solve: Steady by conjugate gradients with one multigrid cycle as
+ *      preconditioner, until the residual, recomputed in double precision, is below
+ *      the tolerance; or time steps, Explicit (forward Euler) or Implicit (backward
+ *      Euler, L-stable), from phi = 0 or from the last state;
+ *   4. write the arrays, and the report into getters and field data
+ *      (`LightDiffusionReport.*`), so that a saved file says how it was made.
+ *
+ * Model AnisotropicDiffusion is Perona and Malik's, the thesis's proof of concept
+ * (Murray 2018, sec. 3.1.3): Source is the field at time 0 and is smoothed
+ * without absorption by D = length * C(|grad S|), C from the input's scalars S (never
+ * from phi), for a bounded number of steps. Fluence then has Source's unit.
+ *
+ * Murray, D.: Legible Visualization of Semi-Transparent Objects using Light
+ * Transport. PhD thesis, Bordeaux 2018, ch. 3 and 4 (eq. 4.3 and 4.4 there have
+ * the sign of grad D . grad phi wrong). Perona, P. and Malik, J.: Scale-space and edge
+ * detection using anisotropic diffusion. PAMI 12(7), 1990.
+ *
+ * Not for radiometry of strongly forward-scattering thin slabs: diffusion is
+ * the first-order (P1) approximation of the transfer equation.
+ *
+ * @sa vtkOpticalMediumFilter vtkLightSeedFilter
+ */
 #ifndef vtkLightDiffusionFilter_h
 #define vtkLightDiffusionFilter_h
 
 #include "vtkImageAlgorithm.h"
 #include "vtkLightTransportFiltersModule.h" // for the export macro
+
+#include <memory> // for the solver's state
+#include <string> // for the report's message
+
+class vtkImageData;
 
 class VTKLIGHTTRANSPORTFILTERS_EXPORT vtkLightDiffusionFilter : public vtkImageAlgorithm
 {
@@ -13,13 +70,250 @@ public:
   vtkTypeMacro(vtkLightDiffusionFilter, vtkImageAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
+  enum ModelType
+  {
+    Diffusion = 0,
+    AnisotropicDiffusion = 1
+  };
+  ///@{
+  /** What moves the light; default Diffusion. */
+  vtkSetMacro(Model, int);
+  vtkGetMacro(Model, int);
+  ///@}
+
+  enum ModeType
+  {
+    Steady = 0,
+    Explicit = 1,
+    Implicit = 2
+  };
+  ///@{
+  /**
+   * Steady (default) finds the state that no longer changes. Explicit and Implicit make
+   * NumberOfSteps time steps per execution (fewer when the steady state is reached to
+   * Tolerance). Steady is an error with AnisotropicDiffusion, which has no absorption and
+   * would end in a constant.
+   */
+  vtkSetMacro(Mode, int);
+  vtkGetMacro(Mode, int);
+  ///@}
+
+  enum BoundaryType
+  {
+    Robin = 0,
+    ZeroFlux = 1,
+    Absorbing = 2
+  };
+  ///@{
+  /**
+   * At the border of the image. Robin (default): light leaves and none comes in, partial
+   * current phi + 2 A D d(phi)/dn = 0. ZeroFlux: a mirror. Absorbing: phi = 0.
+   */
+  vtkSetMacro(Boundary, int);
+  vtkGetMacro(Boundary, int);
+  ///@}
+
+  ///@{
+  /**
+   * Refractive index inside over outside, of the Robin boundary: A = (1 + F_dr) / (1 - F_dr)
+   * with the diffuse Fresnel reflectance F_dr. Above 0, finite; default 1 (A = 1). Tissue in
+   * air: 1.4.
+   */
+  vtkSetMacro(RefractiveIndexRatio, double);
+  vtkGetMacro(RefractiveIndexRatio, double);
+  ///@}
+
+  ///@{
+  /**
+   * Accepted |b - A phi| / |b|, Euclidean norms, of the steady equation (Implicit: of each
+   * step's). In (0, 1); default 1e-8, with which six decades below the maximum are right.
+   * Below about 1e-15 double precision cannot follow: the stop reason then is Breakdown.
+   */
+  vtkSetMacro(Tolerance, double);
+  vtkGetMacro(Tolerance, double);
+  ///@}
+
+  ///@{
+  /** Of the linear solver (Implicit: in each step); >= 1, default 500. 10 to 20 are usual. */
+  vtkSetMacro(MaximumNumberOfIterations, int);
+  vtkGetMacro(MaximumNumberOfIterations, int);
+  ///@}
+
+  ///@{
+  /** Time steps per execution, Explicit and Implicit; >= 1, default 100. */
+  vtkSetMacro(NumberOfSteps, int);
+  vtkGetMacro(NumberOfSteps, int);
+  ///@}
+
+  ///@{
+  /**
+   * The step c dt as a fraction of the positivity bound that is computed from the data
+   * (GetPositivityBound). Above 0; default 1. Explicit: above the stability bound (between 1
+   * and 2 times that) the execution is refused. Implicit: any; 1000 is fast.
+   */
+  vtkSetMacro(CourantNumber, double);
+  vtkGetMacro(CourantNumber, double);
+  ///@}
+
+  ///@{
+  /** The step c dt itself, a length; >= 0, default 0: from CourantNumber. */
+  vtkSetMacro(TimeStep, double);
+  vtkGetMacro(TimeStep, double);
+  ///@}
+
+  enum FluxFunctionType
+  {
+    Exponential = 0,
+    Rational = 1
+  };
+  ///@{
+  /**
+   * AnisotropicDiffusion's C: Exponential (default) exp(-(|grad S|/sigma)^2), keeps sharp edges;
+   * Rational 1 / (1 + (|grad S|/sigma)^2), prefers wide regions. Perona and Malik 1990; Murray
+   * 2018, eq. 3.2 and 3.3.
+   */
+  vtkSetMacro(FluxFunction, int);
+  vtkGetMacro(FluxFunction, int);
+  ///@}
+
+  ///@{
+  /**
+   * sigma of AnisotropicDiffusion, in scalar units per length; >= 0, default 0: chosen from the
+   * data. GetComputedGradientScale tells which was used.
+   */
+  vtkSetMacro(GradientScale, double);
+  vtkGetMacro(GradientScale, double);
+  vtkGetMacro(ComputedGradientScale, double);
+  ///@}
+
+  ///@{
+  /** Also write the array Flux; default off. */
+  vtkSetMacro(ComputeFlux, bool);
+  vtkGetMacro(ComputeFlux, bool);
+  vtkBooleanMacro(ComputeFlux, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Start from the last state when nothing but Source has changed: a steady solve gets there
+   * in fewer iterations, time steps go on from where they were (call Modified() for another
+   * NumberOfSteps, to show progress). Keeps 8 bytes per point. Default off.
+   */
+  vtkSetMacro(Continue, bool);
+  vtkGetMacro(Continue, bool);
+  vtkBooleanMacro(Continue, bool);
+  ///@}
+  /** Forget the last state, so that the next execution starts from phi = 0. */
+  void ResetState();
+
+  ///@{
+  /**
+   * Of Fluence and Flux: vtkAlgorithm::SINGLE_PRECISION (float, default) or DOUBLE_PRECISION.
+   * The solution is in double; a value beyond float's range is an error that says so.
+   */
+  vtkSetMacro(OutputPrecision, int);
+  vtkGetMacro(OutputPrecision, int);
+  ///@}
+
+  enum StopReasonType
+  {
+    Converged = 0,
+    MaxIterations = 1,
+    Breakdown = 2,
+    NotFinite = 3,
+    Diverged = 4,
+    Cancelled = 5,
+    NoSteadyState = 6,
+    BadInput = 7
+  };
+  ///@{
+  /**
+   * The report of the last execution. Only Converged says that the tolerance is met. MaxIterations
+   * of time steps says that all of them were made. After Cancelled, MaxIterations and Breakdown the
+   * output holds the best answer reached.
+   */
+  vtkGetMacro(StopReason, int);
+  const char* GetStopReasonAsString() const;
+  /** What the reason alone does not say; may be empty. */
+  const char* GetMessage() const { return this->Message.c_str(); }
+  /** Iterations of the linear solver; Explicit: steps. */
+  vtkGetMacro(NumberOfIterationsUsed, int);
+  /** |b - A phi| / |b| of the steady equation, recomputed in double from the answer. */
+  vtkGetMacro(Residual, double);
+  vtkGetMacro(SolveSeconds, double);
+  /** Held at the most while solving, beyond the input's and output's arrays. */
+  vtkGetMacro(Bytes, vtkIdType);
+  /** Applications of the operator on the full grid, or sweeps that cost as much. */
+  vtkGetMacro(FineGridApplications, double);
+  ///@}
+  ///@{
+  /** Power: the integrals of q, of sigma_a phi, and of the flux through the border. */
+  vtkGetMacro(EmittedPower, double);
+  vtkGetMacro(AbsorbedPower, double);
+  vtkGetMacro(EscapedPower, double);
+  ///@}
+  ///@{
+  /** Of the medium of the last execution, c dt as a length: up to which an explicit step keeps
+   * positive fields positive, and up to which it is stable (Gershgorin). */
+  vtkGetMacro(PositivityBound, double);
+  vtkGetMacro(StabilityBound, double);
+  /** The c dt that was used. */
+  vtkGetMacro(UsedTimeStep, double);
+  ///@}
+
 protected:
-  vtkLightDiffusionFilter() = default;
-  ~vtkLightDiffusionFilter() override = default;
+  vtkLightDiffusionFilter();
+  ~vtkLightDiffusionFilter() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(vtkInformation* request, vtkInformationVector** inputVector,
+    vtkInformationVector* outputVector) override;
+  int RequestUpdateExtent(vtkInformation* request, vtkInformationVector** inputVector,
+    vtkInformationVector* outputVector) override;
+  int RequestData(vtkInformation* request, vtkInformationVector** inputVector,
+    vtkInformationVector* outputVector) override;
 
 private:
   vtkLightDiffusionFilter(const vtkLightDiffusionFilter&) = delete;
   void operator=(const vtkLightDiffusionFilter&) = delete;
+
+  bool CheckParameters(std::string& problem) const;
+  bool Execute(vtkImageData* input, vtkImageData* output, std::string& problem);
+  void WriteReport(vtkImageData* output) const;
+  void ClearReport();
+
+  int Model = Diffusion;
+  int Mode = Steady;
+  int Boundary = Robin;
+  double RefractiveIndexRatio = 1.;
+  double Tolerance = 1e-8;
+  int MaximumNumberOfIterations = 500;
+  int NumberOfSteps = 100;
+  double CourantNumber = 1.;
+  double TimeStep = 0.;
+  int FluxFunction = Exponential;
+  double GradientScale = 0.;
+  double ComputedGradientScale = 0.;
+  bool ComputeFlux = false;
+  bool Continue = false;
+  int OutputPrecision = SINGLE_PRECISION;
+
+  int StopReason = BadInput;
+  std::string Message;
+  int NumberOfIterationsUsed = 0;
+  double Residual = 0.;
+  double SolveSeconds = 0.;
+  vtkIdType Bytes = 0;
+  double FineGridApplications = 0.;
+  double EmittedPower = 0.;
+  double AbsorbedPower = 0.;
+  double EscapedPower = 0.;
+  double PositivityBound = 0.;
+  double StabilityBound = 0.;
+  double UsedTimeStep = 0.;
+
+  struct State;
+  std::unique_ptr<State> Kept;
 };
 
 #endif

@@ -520,8 +520,7 @@ double DiffusionSolver::norm(const RightHandSide<T>& b) const
     double sum = 0.;
     for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
     {
-      const double v = b.qScale * static_cast<double>(b.q[i]) - b.mean +
-        (b.previous ? b.shift * b.previous[i] : 0.);
+      const double v = b.at(i);
       sum += v * v;
     }
     return sum;
@@ -542,8 +541,7 @@ double DiffusionSolver::residual(
     const std::int64_t o = r * nx;
     for (int i = 0; i < nx; ++i)
     {
-      const double v = b.qScale * static_cast<double>(b.q[o + i]) - b.mean +
-        (b.previous ? b.shift * b.previous[o + i] : 0.) - y[static_cast<std::size_t>(i)];
+      const double v = b.at(o + i) - y[static_cast<std::size_t>(i)];
       sum += v * v;
       if (out)
       {
@@ -696,7 +694,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     if (claims || rNorm < 1e-3 * replaced)
     {
       const double recurred = rNorm;
-      rScale = recurred;
+      rScale = std::max(recurred, 1e-12 * replaced); // a claim of exactly 0 is none
       rNorm = this->residual<T>(b, phi, r.data(), rScale);
       report.fineApplications += 1.;
       report.residual = rNorm / bNorm;
@@ -748,7 +746,7 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
   const int nx = this->box.dims[0];
   const double V = this->box.voxelVolume();
   const std::int64_t size = this->box.size();
-  report.emitted = V * SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
+  report.emitted = !q ? 0. : V * SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
     double sum = 0.;
     for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
     {
@@ -1018,12 +1016,11 @@ DiffusionReport DiffusionSolver::stepExplicit(
       std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
         double* LIGHTTRANSPORT_RESTRICT out = to + r * nx;
         const double* in = from + r * nx;
-        const T* source = q + r * nx;
         applyDouble(doubleRow(this->A, from, r), out);
         double sum = 0.;
         for (int x = 0; x < nx; ++x)
         {
-          const double v = b.qScale * static_cast<double>(source[x]) - out[x];
+          const double v = b.at(r * nx + x) - out[x];
           out[x] = in[x] + step * v;
           sum += v * v;
         }

@@ -124,6 +124,7 @@ public:
    * with the residual replaced by the recomputed one (van der Vorst and Ye 2000)
    * every few decades.
    *
+   *   q: magnitudes up to 1e100 (norms are taken in double);
    *   phi: in, the start (zeros, or an earlier solution); out, the answer reached.
    */
   template <class T>
@@ -132,7 +133,8 @@ public:
   /**
    * Time steps of length c dt (a length > 0) from phi:
    * forward Euler, whose positivity and stability bounds are below, or backward
-   * Euler (L-stable, positive for any step), each to `tolerance`.
+   * Euler (L-stable, positive for any step), each to `tolerance`. q may be null: none.
+   * MaxIterations says that all steps were made, Converged that the steady state came first.
    */
   template <class T>
   DiffusionReport stepExplicit(
@@ -162,6 +164,12 @@ private:
     const double* previous;
     double shift;
     double mean;
+
+    double at(std::int64_t i) const
+    {
+      return (this->q ? this->qScale * static_cast<double>(this->q[i]) - this->mean : 0.) +
+        (this->previous ? this->shift * this->previous[i] : 0.);
+    }
   };
   template <class T>
   void conjugateGradients(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,

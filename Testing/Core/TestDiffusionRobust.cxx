@@ -1,0 +1,252 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * Hard media: the answer's residual is recomputed here, from the equations, and
+ * the iterations are bounded. Then what has no answer, and what stops early.
+ */
+#include "DiffusionScene.h"
+#include "LightTransportTesting.h"
+
+#include <limits>
+#include <random>
+
+using namespace lighttransport;
+using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::Suite;
+
+namespace
+{
+std::size_t index(const DiffusionScene& scene, int i, int j, int k)
+{
+  return static_cast<std::size_t>(scene.grid.index(i, j, k));
+}
+
+void expectSolved(Suite& suite, const std::string& name, DiffusionScene& scene, int iterations,
+  double tolerance = 1e-8)
+{
+  const DiffusionReport report = scene.solve(tolerance);
+  const double residual = scene.residual();
+  double least = 0.;
+  double most = 0.;
+  for (const double phi : scene.phi)
+  {
+    least = std::min(least, phi);
+    most = std::max(most, phi);
+  }
+  std::cout << name << ": " << ToString(report.reason) << ", " << report.iterations
+            << " iterations, residual " << report.residual << " (here " << residual
+            << "), min/max " << least / most << ", balance "
+            << (report.absorbed + report.escaped) / report.emitted - 1. << " " << report.message
+            << "\n";
+  suite.check(report.reason == StopReason::Converged, name + " converges", __FILE__, __LINE__);
+  suite.check(report.iterations <= iterations, name + ": iterations", __FILE__, __LINE__);
+  // The operator's coefficients are float, so the equations' own residual has a floor of the
+  // rounding of D / h^2 times phi against q.
+  suite.check(residual < 1e-4, name + ": the equations hold", __FILE__, __LINE__);
+  suite.check(-least <= tolerance * most, name + ": positive", __FILE__, __LINE__);
+  LT_CHECK_CLOSE(suite, report.absorbed + report.escaped, report.emitted, 1e-6);
+}
+
+void hardMedia(Suite& suite)
+{
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(0., 1.);
+  std::cout << "seed 11\n";
+  for (const double decades : { 2., 4., 6., 8. })
+  {
+    DiffusionScene scene({ { 31, 37, 29 } }, { { 1., 1., 1. } });
+    for (std::size_t i = 0; i < scene.D.size(); ++i)
+    {
+      scene.D[i] = std::pow(10., -decades * uniform(random));
+      scene.sigma_a[i] = 1e-3 * (1. - scene.D[i]);
+    }
+    scene.q[index(scene, 15, 15, 15)] = 1.;
+    expectSolved(suite, "noise over " + std::to_string(decades) + " decades", scene, 60);
+  }
+  {
+    DiffusionScene scene({ { 32, 32, 32 } }, { { 1., 1., 1. } });
+    scene.fill(scene.D, [](double x, double y, double z) {
+      return (static_cast<int>(x) + static_cast<int>(y) + static_cast<int>(z)) % 2 ? 1e-8 : 1.;
+    });
+    scene.sigma_a.assign(scene.q.size(), 1e-4);
+    scene.q[index(scene, 16, 16, 16)] = 1.;
+    expectSolved(suite, "checkerboard 1e8", scene, 60);
+  }
+  {
+    DiffusionScene scene({ { 32, 32, 32 } }, { { 1., 1., 1. } });
+    scene.fill(scene.D, [](double x, double, double) { return x < 15. ? 1. : 1e-8; });
+    scene.q[index(scene, 8, 16, 16)] = 1.;
+    expectSolved(suite, "one face 1e8", scene, 30);
+  }
+  {
+    // a winding corridor of one voxel, and nothing but its ends lets light out
+    DiffusionScene scene({ { 33, 33, 3 } }, { { 1., 1., 1. } });
+    scene.boundary = Boundary::ZeroFlux;
+    scene.fill(scene.D, [](double x, double y, double z) {
+      const int i = static_cast<int>(x);
+      const int j = static_cast<int>(y);
+      const bool open = static_cast<int>(z) == 1 && (j % 2 == 1 || i == ((j / 2) % 2 ? 1 : 31));
+      return open ? 1. : 1e-6;
+    });
+    scene.sigma_a.assign(scene.q.size(), 1e-4);
+    scene.q[index(scene, 1, 1, 1)] = 1.;
+    expectSolved(suite, "labyrinth", scene, 200);
+  }
+  for (const double ratio : { 10., 1000. })
+  {
+    DiffusionScene scene({ { 20, 24, 28 } }, { { 1., ratio, 1. } });
+    for (std::size_t i = 0; i < scene.D.size(); ++i)
+    {
+      scene.D[i] = std::pow(10., -2. * uniform(random));
+      scene.sigma_a[i] = 1e-3;
+    }
+    scene.q[index(scene, 10, 12, 14)] = 1.;
+    expectSolved(suite, "spacing 1:" + std::to_string(ratio), scene, 60);
+  }
+  for (const std::array<int, 3>& dims : { std::array<int, 3>{ { 1, 1, 101 } },
+         std::array<int, 3>{ { 97, 1, 89 } }, std::array<int, 3>{ { 2, 3, 5 } },
+         std::array<int, 3>{ { 53, 2, 3 } }, std::array<int, 3>{ { 1, 1, 1 } } })
+  {
+    DiffusionScene scene(dims, { { 1., 1., 1. } });
+    for (std::size_t i = 0; i < scene.D.size(); ++i)
+    {
+      scene.D[i] = 0.01 + uniform(random);
+    }
+    scene.sigma_a.assign(scene.q.size(), 0.01);
+    scene.q[scene.q.size() / 2] = 1.;
+    expectSolved(suite,
+      std::to_string(dims[0]) + "x" + std::to_string(dims[1]) + "x" + std::to_string(dims[2]),
+      scene, 30);
+  }
+  {
+    // almost no way out: sigma_a 1e-12 between mirrors; phi = power / (sigma_a V) everywhere
+    DiffusionScene scene({ { 16, 16, 16 } }, { { 1., 1., 1. } });
+    scene.boundary = Boundary::ZeroFlux;
+    scene.sigma_a.assign(scene.q.size(), 1e-12);
+    scene.q[index(scene, 3, 4, 5)] = 1.;
+    expectSolved(suite, "nearly singular", scene, 30);
+    LT_CHECK_CLOSE(suite, scene.phi[0], 1e12 / 4096., 1e-5);
+  }
+  for (const double power : { 1e-100, 1e-30, 1e30, 1e100 })
+  {
+    DiffusionScene scene({ { 12, 12, 12 } }, { { 1., 1., 1. } });
+    scene.sigma_a.assign(scene.q.size(), 0.1);
+    scene.q[index(scene, 6, 6, 6)] = power;
+    scene.q[index(scene, 2, 2, 2)] = power;
+    const DiffusionReport report = scene.solve(1e-8);
+    LT_CHECK(suite, report.reason == StopReason::Converged);
+    LT_CHECK_CLOSE(suite, report.absorbed + report.escaped, 2. * power, 1e-6);
+  }
+}
+
+void noAnswer(Suite& suite)
+{
+  DiffusionScene scene({ { 8, 8, 8 } }, { { 1., 1., 1. } });
+  scene.boundary = Boundary::ZeroFlux;
+  scene.q[index(scene, 2, 2, 2)] = 1.;
+  DiffusionReport report = scene.solve();
+  LT_CHECK(suite, report.reason == StopReason::NoSteadyState && report.iterations == 0);
+  LT_CHECK(suite, report.message.find("absorption") != std::string::npos);
+
+  // balanced sources have one, up to a constant, which is taken such that the mean is 0
+  scene.q[index(scene, 6, 5, 4)] = -1.;
+  report = scene.solve();
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  LT_CHECK(suite, scene.residual() < 1e-6);
+  double mean = 0.;
+  for (const double phi : scene.phi)
+  {
+    mean += phi;
+  }
+  LT_CHECK_NEAR(suite, mean, 0., 1e-9);
+
+  // a closed room in an open world
+  DiffusionScene room({ { 9, 9, 9 } }, { { 1., 1., 1. } });
+  room.fill(room.D, [](double x, double y, double z) {
+    const double d = std::max(std::max(std::abs(x - 4.5), std::abs(y - 4.5)), std::abs(z - 4.5));
+    return d > 1.2 && d < 2.2 ? 0. : 1.;
+  });
+  room.q[index(room, 4, 4, 4)] = 1.;
+  report = room.solve();
+  LT_CHECK(suite, report.reason == StopReason::NoSteadyState);
+  LT_CHECK(suite, report.message.find("(4, 4, 4)") != std::string::npos);
+  room.q.assign(room.q.size(), 0.);
+  room.q[index(room, 0, 0, 0)] = 1.;
+  LT_CHECK(suite, room.solve().reason == StopReason::Converged);
+  LT_CHECK(suite, room.phi[index(room, 4, 4, 4)] == 0.);
+  // a source inside the wall itself
+  room.q[index(room, 6, 4, 4)] = 1.;
+  LT_CHECK(suite, room.solve().reason == StopReason::NoSteadyState);
+
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double bad : { nan, inf, -1. })
+  {
+    DiffusionScene wrong({ { 4, 5, 6 } }, { { 1., 1., 1. } });
+    wrong.D[index(wrong, 1, 2, 3)] = bad;
+    report = wrong.solve();
+    LT_CHECK(suite, report.reason == StopReason::BadInput);
+    LT_CHECK(suite, report.message.find("diffusion coefficient") != std::string::npos);
+    LT_CHECK(suite, report.message.find("(1, 2, 3)") != std::string::npos);
+    wrong.D[index(wrong, 1, 2, 3)] = 1.;
+    wrong.sigma_a[index(wrong, 3, 4, 5)] = bad;
+    report = wrong.solve();
+    LT_CHECK(suite, report.reason == StopReason::BadInput);
+    LT_CHECK(suite, report.message.find("absorption") != std::string::npos);
+  }
+}
+
+void stops(Suite& suite)
+{
+  DiffusionScene scene({ { 24, 24, 24 } }, { { 1., 1., 1. } });
+  scene.sigma_a.assign(scene.q.size(), 1e-3);
+  scene.q[index(scene, 5, 6, 7)] = 1.;
+  // more than double can give: an honest stop, the best answer kept
+  DiffusionReport report = scene.solve(1e-19);
+  LT_CHECK(suite, report.reason == StopReason::Breakdown || report.reason == StopReason::MaxIterations);
+  LT_CHECK(suite, report.residual < 1e-13);
+  LT_CHECK(suite, report.iterations < 100);
+
+  DiffusionSolver solver;
+  solver.setMedium(scene.medium());
+  DiffusionControl control;
+  control.maxIterations = 2;
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.iterations == 2);
+  LT_CHECK(suite, report.residual > control.tolerance && report.residual < 1.);
+  control.maxIterations = 100;
+  int calls = 0;
+  double last = -1.;
+  bool rising = true;
+  control.progress = [&](double fraction) {
+    rising = rising && fraction >= last - 0.05 && fraction <= 1.;
+    last = fraction;
+    return ++calls < 4;
+  };
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Cancelled && report.iterations == 3);
+  LT_CHECK(suite, rising);
+  // going on from there
+  control.progress = nullptr;
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  const int remaining = report.iterations;
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations == 0);
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, remaining < report.iterations);
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  Suite suite(argc, argv);
+  Suite::trapFloatingPoint();
+  hardMedia(suite);
+  noAnswer(suite);
+  stops(suite);
+  return suite.result();
+}

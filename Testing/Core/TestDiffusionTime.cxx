@@ -1,0 +1,215 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/** Time steps: exact decay of eigenmodes, bounds, positivity, the steady state reached. */
+#include "DiffusionScene.h"
+#include "LightTransportTesting.h"
+
+#include <random>
+
+using namespace lighttransport;
+using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::Suite;
+
+namespace
+{
+const double Pi = std::acos(-1.);
+
+/** A cosine between mirrors is an eigenvector: each step multiplies it by a known factor. */
+void eigenmode(Suite& suite)
+{
+  const int n = 24;
+  const double h = 0.5;
+  const double D = 0.8;
+  const double sigma = 0.3;
+  DiffusionScene scene({ { n, 1, 6 } }, { { h, 1., 1. } });
+  scene.boundary = Boundary::ZeroFlux;
+  scene.D.assign(scene.D.size(), D);
+  scene.sigma_a.assign(scene.D.size(), sigma);
+  const double k = 3.;
+  const auto mode = [&](double x, double, double) { return std::cos(k * Pi * x / (n * h)); };
+  const double lambda = sigma + D * (2. - 2. * std::cos(Pi * k / n)) / (h * h);
+
+  DiffusionSolver solver;
+  LT_CHECK(suite, solver.setMedium(scene.medium()).reason == StopReason::Converged);
+  DiffusionControl control;
+  control.tolerance = 1e-13;
+  const double bound = solver.positivityBound();
+  LT_CHECK_CLOSE(suite, bound, 1. / (2. * D / (h * h) + 2. * D + sigma), 1e-6);
+  LT_CHECK_CLOSE(suite, solver.stabilityBound(), 2. / (4. * D / (h * h) + 4. * D + sigma), 1e-6);
+
+  const int steps = 7;
+  scene.fill(scene.phi, mode);
+  DiffusionReport report =
+    solver.stepExplicit(static_cast<const double*>(nullptr), scene.phi.data(), steps, bound, control);
+  LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.iterations == steps);
+  double factor = std::pow(1. - lambda * bound, steps);
+  LT_CHECK_NEAR(suite,
+    scene.worst([&](double x, double y, double z) { return factor * mode(x, y, z); }), 0., 1e-6);
+
+  for (const double cdt : { 0.1 * bound, 50. * bound, 1e5 * bound })
+  {
+    scene.fill(scene.phi, mode);
+    report = solver.stepImplicit(
+      static_cast<const double*>(nullptr), scene.phi.data(), steps, cdt, control);
+    factor = std::pow(1. + lambda * cdt, -steps);
+    LT_CHECK_NEAR(suite,
+      scene.worst([&](double x, double y, double z) { return factor * mode(x, y, z); }), 0., 1e-6);
+  }
+  // the shift of the implicit steps is gone again
+  scene.q.assign(scene.q.size(), 1.);
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK_NEAR(
+    suite, scene.worst([&](double, double, double) { return 1. / sigma; }), 0., 1e-6);
+}
+
+DiffusionScene randomScene(unsigned int seed, std::array<int, 3> dims, double decades)
+{
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0., 1.);
+  DiffusionScene scene(dims, { { 1., 1.5, 0.8 } });
+  for (std::size_t i = 0; i < scene.D.size(); ++i)
+  {
+    scene.D[i] = std::pow(10., -decades * uniform(random));
+    scene.sigma_a[i] = 0.1 * uniform(random);
+    scene.q[i] = uniform(random) < 0.02 ? 1. : 0.;
+  }
+  return scene;
+}
+
+void steadyReached(Suite& suite)
+{
+  std::cout << "seeds 5, 6\n";
+  DiffusionScene steady = randomScene(5, { { 10, 9, 8 } }, 1.);
+  steady.solve(1e-12);
+  DiffusionSolver solver;
+  solver.setMedium(steady.medium());
+  DiffusionControl control;
+  control.tolerance = 1e-9;
+  const auto difference = [&](const std::vector<double>& phi) {
+    double d = 0.;
+    double m = 0.;
+    for (std::size_t i = 0; i < phi.size(); ++i)
+    {
+      d = std::max(d, std::abs(phi[i] - steady.phi[i]));
+      m = std::max(m, steady.phi[i]);
+    }
+    return d / m;
+  };
+  std::vector<double> phi(steady.phi.size(), 0.);
+  DiffusionReport report = solver.stepExplicit(
+    steady.q.data(), phi.data(), 20000, solver.positivityBound(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations < 20000);
+  LT_CHECK_NEAR(suite, difference(phi), 0., 1e-6);
+  phi.assign(phi.size(), 0.);
+  report = solver.stepExplicit(
+    steady.q.data(), phi.data(), 20000, solver.stabilityBound(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  LT_CHECK_NEAR(suite, difference(phi), 0., 1e-6);
+  phi.assign(phi.size(), 0.);
+  report = solver.stepImplicit(
+    steady.q.data(), phi.data(), 200, 1000. * solver.positivityBound(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  LT_CHECK_NEAR(suite, difference(phi), 0., 1e-6);
+}
+
+/** Positive fields stay positive up to the bound, at contrast 1e8; beyond stability: refused. */
+void bounds(Suite& suite)
+{
+  DiffusionScene scene = randomScene(6, { { 13, 11, 7 } }, 8.);
+  DiffusionSolver solver;
+  solver.setMedium(scene.medium());
+  DiffusionControl control;
+  bool positive = true;
+  for (int step = 0; step < 200; ++step)
+  {
+    solver.stepExplicit(scene.q.data(), scene.phi.data(), 1, solver.positivityBound(), control);
+    for (const double phi : scene.phi)
+    {
+      positive = positive && phi >= 0.;
+    }
+  }
+  LT_CHECK(suite, positive);
+  const std::vector<double> before = scene.phi;
+  const DiffusionReport refused = solver.stepExplicit(
+    scene.q.data(), scene.phi.data(), 1, 1.01 * solver.stabilityBound(), control);
+  LT_CHECK(suite, refused.reason == StopReason::BadInput);
+  LT_CHECK(suite, refused.message.find("unstable") != std::string::npos);
+  LT_CHECK(suite, scene.phi == before);
+
+  // The bound is sharp on a homogeneous medium: the checkerboard mode, by power iteration.
+  DiffusionScene plain({ { 16, 16, 16 } }, { { 1., 1., 1. } });
+  plain.boundary = Boundary::ZeroFlux;
+  plain.sigma_a.assign(plain.q.size(), 0.5);
+  LT_CHECK(suite, solver.setMedium(plain.medium()).reason == StopReason::Converged);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1., 1.);
+  for (double& phi : plain.phi)
+  {
+    phi = uniform(random);
+  }
+  const double cdt = 0.5 * solver.stabilityBound(); // phi - cdt A phi: the largest eigenvalue -> -1
+  double growth = 0.;
+  for (int i = 0; i < 400; ++i)
+  {
+    double before2 = 0.;
+    double after2 = 0.;
+    std::vector<double> old = plain.phi;
+    solver.stepExplicit(static_cast<const double*>(nullptr), plain.phi.data(), 1, cdt, control);
+    for (std::size_t v = 0; v < old.size(); ++v)
+    {
+      plain.phi[v] = (old[v] - plain.phi[v]) / cdt; // A phi
+      before2 += old[v] * old[v];
+      after2 += plain.phi[v] * plain.phi[v];
+    }
+    growth = std::sqrt(after2 / before2);
+    for (double& phi : plain.phi)
+    {
+      phi /= std::sqrt(after2);
+    }
+  }
+  LT_CHECK(suite, growth <= 2. / solver.stabilityBound() * (1. + 1e-6));
+  LT_CHECK(suite, growth >= 0.98 * 2. / solver.stabilityBound());
+}
+
+void stored(Suite& suite)
+{
+  // Between mirrors and without absorption, what was there stays there.
+  DiffusionScene scene = randomScene(8, { { 9, 8, 7 } }, 3.);
+  scene.boundary = Boundary::ZeroFlux;
+  scene.sigma_a.assign(scene.q.size(), 0.);
+  scene.phi = scene.q;
+  DiffusionSolver solver;
+  solver.setMedium(scene.medium());
+  DiffusionControl control;
+  double before = 0.;
+  double after = 0.;
+  for (const double phi : scene.phi)
+  {
+    before += phi;
+  }
+  solver.stepExplicit(static_cast<const double*>(nullptr), scene.phi.data(), 500,
+    solver.positivityBound(), control);
+  for (const double phi : scene.phi)
+  {
+    after += phi;
+  }
+  LT_CHECK_CLOSE(suite, after, before, 1e-12);
+  int calls = 0;
+  control.progress = [&calls](double) { return ++calls < 4; };
+  const DiffusionReport report = solver.stepExplicit(
+    scene.q.data(), scene.phi.data(), 500, solver.positivityBound(), control);
+  LT_CHECK(suite, report.reason == StopReason::Cancelled && report.iterations == 4);
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  Suite suite(argc, argv);
+  Suite::trapFloatingPoint();
+  eigenmode(suite);
+  steadyReached(suite);
+  bounds(suite);
+  stored(suite);
+  return suite.result();
+}
