@@ -38,11 +38,11 @@ vtkStandardNewMacro(vtkLightDiffusionFilter);
 
 namespace
 {
-static_assert(static_cast<int>(lighttransport::StopReason::BadInput) ==
-    vtkLightDiffusionFilter::BadInput,
+static_assert(
+  static_cast<int>(lighttransport::StopReason::BadInput) == vtkLightDiffusionFilter::BadInput,
   "the filter's reasons are the core's");
-static_assert(static_cast<int>(lighttransport::Boundary::Absorbing) ==
-    vtkLightDiffusionFilter::Absorbing,
+static_assert(
+  static_cast<int>(lighttransport::Boundary::Absorbing) == vtkLightDiffusionFilter::Absorbing,
   "the filter's boundaries are the core's");
 
 /** What the operator was made of: enough to tell whether it still holds. */
@@ -309,7 +309,8 @@ bool vtkLightDiffusionFilter::Execute(
     }
   }
   const bool anisotropic = this->Model == AnisotropicDiffusion;
-  const auto find = [&](vtkImageData* image, const char* name) -> vtkDataArray* {
+  const auto find = [&](vtkImageData* image, const char* name) -> vtkDataArray*
+  {
     vtkDataArray* array = image->GetPointData()->GetArray(name);
     if (!array)
     {
@@ -319,7 +320,8 @@ bool vtkLightDiffusionFilter::Execute(
         text << " (a cell array has that name)";
       }
       text << "; expected one of "
-           << (std::string(name) == names::Source ? "vtkLightSeedFilter" : "vtkOpticalMediumFilter");
+           << (std::string(name) == names::Source ? "vtkLightSeedFilter"
+                                                  : "vtkOpticalMediumFilter");
     }
     else if (array->GetNumberOfComponents() != 1 || array->GetNumberOfTuples() != size)
     {
@@ -481,7 +483,8 @@ bool vtkLightDiffusionFilter::Execute(
   {
     kept.valid = false;
     kept.phi.release();
-    const auto build = [&](auto zero, const auto* d, const auto* s) {
+    const auto build = [&](auto zero, const auto* d, const auto* s)
+    {
       lighttransport::DiffusionMedium<decltype(zero)> medium;
       medium.grid.dims = { { key.dims[0], key.dims[1], key.dims[2] } };
       medium.grid.spacing = { { spacing[0], spacing[1], spacing[2] } };
@@ -539,14 +542,16 @@ bool vtkLightDiffusionFilter::Execute(
   lighttransport::DiffusionControl control;
   control.tolerance = this->Tolerance;
   control.maxIterations = this->MaximumNumberOfIterations;
-  control.progress = [this](double fraction) {
+  control.progress = [this](double fraction)
+  {
     this->UpdateProgress(fraction);
     return !this->GetAbortExecute();
   };
   this->UsedTimeStep = this->Mode == Steady ? 0.
     : this->TimeStep > 0.                   ? this->TimeStep
                                             : this->CourantNumber * this->PositivityBound;
-  const auto solve = [&](const auto* q) {
+  const auto solve = [&](const auto* q)
+  {
     switch (this->Mode)
     {
       case Explicit:
@@ -594,9 +599,9 @@ bool vtkLightDiffusionFilter::Execute(
   {
     vtkWarningMacro(<< this->GetStopReasonAsString() << " after " << this->NumberOfIterationsUsed
                     << " iterations: the relative residual is " << this->Residual
-                    << " instead of <= " << this->Tolerance
-                    << (report.message.empty() ? "" : " (") << report.message
-                    << (report.message.empty() ? "" : ")") << "; the best answer is kept");
+                    << " instead of <= " << this->Tolerance << (report.message.empty() ? "" : " (")
+                    << report.message << (report.message.empty() ? "" : ")")
+                    << "; the best answer is kept");
   }
 
   // 4. the arrays
@@ -634,7 +639,8 @@ bool vtkLightDiffusionFilter::Execute(
   output->GetPointData()->AddArray(fluence);
   if (this->ComputeFlux)
   {
-    const auto write = [&](auto* array) {
+    const auto write = [&](auto* array)
+    {
       array->SetName(names::Flux);
       array->SetNumberOfComponents(3);
       array->SetNumberOfTuples(size);
@@ -646,8 +652,8 @@ bool vtkLightDiffusionFilter::Execute(
         using Value = std::remove_pointer_t<decltype(E)>;
         for (vtkIdType i = 0; i < size; ++i)
         {
-          const double along[3] = { static_cast<double>(E[3 * i]), static_cast<double>(E[3 * i + 1]),
-            static_cast<double>(E[3 * i + 2]) };
+          const double along[3] = { static_cast<double>(E[3 * i]),
+            static_cast<double>(E[3 * i + 1]), static_cast<double>(E[3 * i + 2]) };
           double world[3];
           direction->MultiplyPoint(along, world);
           for (int d = 0; d < 3; ++d)
@@ -681,13 +687,15 @@ void vtkLightDiffusionFilter::WriteReport(vtkImageData* output) const
 {
   vtkFieldData* field = output->GetFieldData();
   const auto name = [](const char* what) { return std::string("LightDiffusionReport.") + what; };
-  const auto number = [&](const char* what, double value) {
+  const auto number = [&](const char* what, double value)
+  {
     vtkNew<vtkDoubleArray> array;
     array->SetName(name(what).c_str());
     array->InsertNextValue(value);
     field->AddArray(array);
   };
-  const auto word = [&](const char* what, const char* value) {
+  const auto word = [&](const char* what, const char* value)
+  {
     vtkNew<vtkStringArray> array;
     array->SetName(name(what).c_str());
     array->InsertNextValue(value);

@@ -189,6 +189,10 @@ std::string vtkOpticalMediumFilter::FindParameterProblem() const
   {
     text << "DiffusionMapping is " << this->DiffusionMapping << ", expected 0 to 2";
   }
+  else if (this->GradientFunction != Exponential && this->GradientFunction != Rational)
+  {
+    text << "GradientFunction is " << this->GradientFunction << ", expected 0 or 1";
+  }
   else if (this->AbsorptionMapping < FromComplement || this->AbsorptionMapping > FromFunction)
   {
     text << "AbsorptionMapping is " << this->AbsorptionMapping << ", expected 0 to 2";
@@ -309,6 +313,7 @@ std::string vtkOpticalMediumFilter::Compute(
   MediumParameters parameters;
   parameters.useGradient = this->DiffusionMapping != FromTransferFunction;
   parameters.complement = this->DiffusionComplement;
+  parameters.rational = this->GradientFunction == Rational;
   parameters.gradientScale = this->GradientScale;
   parameters.derivativeScale = this->DerivativeScale < 0. ? spacing : this->DerivativeScale;
   parameters.ell = this->DiffusionLength > 0. ? this->DiffusionLength : spacing;
@@ -422,6 +427,7 @@ void vtkOpticalMediumFilter::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "DiffusionMapping: " << this->DiffusionMapping << "\n";
+  os << indent << "GradientFunction: " << this->GradientFunction << "\n";
   os << indent << "DiffusionComplement: " << this->DiffusionComplement << "\n";
   os << indent << "DiffusionFunction: " << this->DiffusionFunction << "\n";
   os << indent << "GradientScale: " << this->GradientScale << "\n";

@@ -78,6 +78,15 @@ public:
     FromTransferFunctionGradient = 2
   };
 
+  /** How beta falls with the gradient's length (Perona and Malik 1990). */
+  enum GradientFunctions
+  {
+    /** exp(-(|grad S|/sigma)^2): keeps sharp edges. */
+    Exponential = 0,
+    /** 1 / (1 + (|grad S|/sigma)^2): prefers wide regions, lets more pass. */
+    Rational = 1
+  };
+
   /** Where sigma_a comes from. */
   enum AbsorptionMappings
   {
@@ -124,6 +133,12 @@ public:
    */
   virtual void SetDiffusionFunction(vtkPiecewiseFunction* function);
   vtkGetObjectMacro(DiffusionFunction, vtkPiecewiseFunction);
+  ///@}
+
+  ///@{
+  /** How beta falls with the gradient's length; default Exponential. */
+  vtkSetMacro(GradientFunction, int);
+  vtkGetMacro(GradientFunction, int);
   ///@}
 
   ///@{
@@ -267,6 +282,7 @@ protected:
     vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
   int DiffusionMapping = FromScalarGradient;
+  int GradientFunction = Exponential;
   bool DiffusionComplement = false;
   vtkPiecewiseFunction* DiffusionFunction = nullptr;
   double GradientScale = 0.;

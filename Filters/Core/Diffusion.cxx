@@ -54,9 +54,8 @@ DoubleRow doubleRow(const DiffusionOperator& A, const double* x, std::int64_t r)
   const std::int64_t o = r * nx;
   const float* zeros = A.zeros.data();
   // The face to a row outside has conductance 0: the row itself can stand for it.
-  return { A.dims[0], A.g[0].data() + o, A.g[1].data() + o,
-    j > 0 ? A.g[1].data() + o - nx : zeros, A.g[2].data() + o,
-    k > 0 ? A.g[2].data() + o - nx * ny : zeros, A.s.data() + o, x + o,
+  return { A.dims[0], A.g[0].data() + o, A.g[1].data() + o, j > 0 ? A.g[1].data() + o - nx : zeros,
+    A.g[2].data() + o, k > 0 ? A.g[2].data() + o - nx * ny : zeros, A.s.data() + o, x + o,
     j > 0 ? x + o - nx : x + o, j + 1 < ny ? x + o + nx : x + o, k > 0 ? x + o - nx * ny : x + o,
     k + 1 < nz ? x + o + nx * ny : x + o };
 }
@@ -242,7 +241,8 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   const std::array<int, 3>& n = this->box.dims;
   const std::array<double, 3>& h = this->box.spacing;
   const std::int64_t size = this->box.size();
-  const auto bad = [&report](const std::string& what) {
+  const auto bad = [&report](const std::string& what)
+  {
     report.reason = StopReason::BadInput;
     report.message = what;
     return report;
@@ -266,9 +266,8 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   // A voxel outside the domain is a wall; so is one whose D is 0.
   const T* D = medium.D;
   const std::uint8_t* outside = medium.outside;
-  const auto diffusion = [D, outside](std::int64_t i) {
-    return outside && outside[i] ? T(0) : D[i];
-  };
+  const auto diffusion = [D, outside](std::int64_t i)
+  { return outside && outside[i] ? T(0) : D[i]; };
 
   // 1. check, and find the scale: no diagonal is above it
   struct Extremes
@@ -277,34 +276,36 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
     double D = 0., sigma = 0.;
   };
   std::vector<Extremes> extremes(static_cast<std::size_t>(this->rows()));
-  ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(this->parallelFor, this->rows(), size,
+    [&](std::int64_t begin, std::int64_t end)
     {
-      Extremes& e = extremes[static_cast<std::size_t>(r)];
-      for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
+      for (std::int64_t r = begin; r < end; ++r)
       {
-        if (outside && outside[i])
+        Extremes& e = extremes[static_cast<std::size_t>(r)];
+        for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
         {
-          continue;
-        }
-        if (!std::isfinite(D[i]) || D[i] < T(0))
-        {
-          e.badD = e.badD < 0 ? i : e.badD;
-          continue;
-        }
-        e.D = std::max(e.D, static_cast<double>(D[i]));
-        if (medium.sigma_a)
-        {
-          if (!std::isfinite(medium.sigma_a[i]) || medium.sigma_a[i] < T(0))
+          if (outside && outside[i])
           {
-            e.badSigma = e.badSigma < 0 ? i : e.badSigma;
             continue;
           }
-          e.sigma = std::max(e.sigma, static_cast<double>(medium.sigma_a[i]));
+          if (!std::isfinite(D[i]) || D[i] < T(0))
+          {
+            e.badD = e.badD < 0 ? i : e.badD;
+            continue;
+          }
+          e.D = std::max(e.D, static_cast<double>(D[i]));
+          if (medium.sigma_a)
+          {
+            if (!std::isfinite(medium.sigma_a[i]) || medium.sigma_a[i] < T(0))
+            {
+              e.badSigma = e.badSigma < 0 ? i : e.badSigma;
+              continue;
+            }
+            e.sigma = std::max(e.sigma, static_cast<double>(medium.sigma_a[i]));
+          }
         }
       }
-    }
-  });
+    });
   Extremes all;
   for (const Extremes& e : extremes)
   {
@@ -314,7 +315,8 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
     all.sigma = std::max(all.sigma, e.sigma);
   }
   extremes = std::vector<Extremes>();
-  const auto describe = [&](const char* name, std::int64_t i, double value, const char* unit) {
+  const auto describe = [&](const char* name, std::int64_t i, double value, const char* unit)
+  {
     std::ostringstream text;
     text << name << " is " << value << " at voxel (" << i % n[0] << ", " << (i / n[0]) % n[1]
          << ", " << i / (static_cast<std::int64_t>(n[0]) * n[1])
@@ -323,8 +325,8 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   };
   if (all.badD >= 0)
   {
-    return bad(describe(
-      "the diffusion coefficient", all.badD, static_cast<double>(D[all.badD]), "length"));
+    return bad(
+      describe("the diffusion coefficient", all.badD, static_cast<double>(D[all.badD]), "length"));
   }
   if (all.badSigma >= 0)
   {
@@ -350,48 +352,49 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   // 2. the operator
   this->A.allocate(n);
   this->boundaryOf(medium.boundary);
-  const double twoA = medium.boundary == Boundary::Robin
-    ? 2. * BoundaryFactor(medium.refractiveIndexRatio)
-    : 0.;
+  const double twoA =
+    medium.boundary == Boundary::Robin ? 2. * BoundaryFactor(medium.refractiveIndexRatio) : 0.;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   const double inverse = 1. / this->scale;
-  ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(this->parallelFor, this->rows(), size,
+    [&](std::int64_t begin, std::int64_t end)
     {
-      int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-      for (at[0] = 0; at[0] < n[0]; ++at[0])
+      for (std::int64_t r = begin; r < end; ++r)
       {
-        const std::int64_t i = at[0] + r * n[0];
-        const T Di = diffusion(i);
-        double sink = medium.sigma_a && !(outside && outside[i])
-          ? static_cast<double>(medium.sigma_a[i]) * inverse
-          : 0.;
-        for (int d = 0; d < 3; ++d)
+        int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
+        for (at[0] = 0; at[0] < n[0]; ++at[0])
         {
-          if (at[d] + 1 < n[d])
+          const std::int64_t i = at[0] + r * n[0];
+          const T Di = diffusion(i);
+          double sink = medium.sigma_a && !(outside && outside[i])
+            ? static_cast<double>(medium.sigma_a[i]) * inverse
+            : 0.;
+          for (int d = 0; d < 3; ++d)
           {
-            this->A.g[d][i] = static_cast<float>(
-              harmonicMean(Di, diffusion(i + stride[d])) * inverse / (h[d] * h[d]));
-          }
-          if (n[d] > 1 && medium.boundary != Boundary::ZeroFlux)
-          {
-            for (int side = 0; side < 2; ++side)
+            if (at[d] + 1 < n[d])
             {
-              if (at[d] == (side ? n[d] - 1 : 0))
+              this->A.g[d][i] = static_cast<float>(
+                harmonicMean(Di, diffusion(i + stride[d])) * inverse / (h[d] * h[d]));
+            }
+            if (n[d] > 1 && medium.boundary != Boundary::ZeroFlux)
+            {
+              for (int side = 0; side < 2; ++side)
               {
-                const double Dd = static_cast<double>(Di);
-                const double out = Dd / (0.5 * h[d] + twoA * Dd) / h[d] * inverse;
-                this->border[d][side][static_cast<std::size_t>(this->borderIndex(d, at))] =
-                  static_cast<float>(out);
-                sink += out;
+                if (at[d] == (side ? n[d] - 1 : 0))
+                {
+                  const double Dd = static_cast<double>(Di);
+                  const double out = Dd / (0.5 * h[d] + twoA * Dd) / h[d] * inverse;
+                  this->border[d][side][static_cast<std::size_t>(this->borderIndex(d, at))] =
+                    static_cast<float>(out);
+                  sink += out;
+                }
               }
             }
           }
+          this->A.s[i] = static_cast<float>(sink);
         }
-        this->A.s[i] = static_cast<float>(sink);
       }
-    }
-  });
+    });
 
   // 3. what the solvers ask of it
   struct Summary
@@ -400,27 +403,29 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
     bool sink = false, noSink = false, wall = false;
   };
   std::vector<Summary> summaries(static_cast<std::size_t>(this->rows()));
-  ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(this->parallelFor, this->rows(), size,
+    [&](std::int64_t begin, std::int64_t end)
     {
-      Summary& summary = summaries[static_cast<std::size_t>(r)];
-      const int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-      for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
+      for (std::int64_t r = begin; r < end; ++r)
       {
-        if (outside && outside[i])
+        Summary& summary = summaries[static_cast<std::size_t>(r)];
+        const int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
+        for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
         {
-          continue;
+          if (outside && outside[i])
+          {
+            continue;
+          }
+          float faces = this->A.g[0][i] + (i > 0 ? this->A.g[0][i - 1] : 0.f) + this->A.g[1][i] +
+            (at[1] > 0 ? this->A.g[1][i - stride[1]] : 0.f) + this->A.g[2][i] +
+            (at[2] > 0 ? this->A.g[2][i - stride[2]] : 0.f);
+          summary.diagonal = std::max(summary.diagonal, faces + this->A.s[i]);
+          summary.gershgorin = std::max(summary.gershgorin, 2.f * faces + this->A.s[i]);
+          (this->A.s[i] > NoSink ? summary.sink : summary.noSink) = true;
+          summary.wall = summary.wall || !(static_cast<double>(diffusion(i)) > 0.);
         }
-        float faces = this->A.g[0][i] + (i > 0 ? this->A.g[0][i - 1] : 0.f) + this->A.g[1][i] +
-          (at[1] > 0 ? this->A.g[1][i - stride[1]] : 0.f) + this->A.g[2][i] +
-          (at[2] > 0 ? this->A.g[2][i - stride[2]] : 0.f);
-        summary.diagonal = std::max(summary.diagonal, faces + this->A.s[i]);
-        summary.gershgorin = std::max(summary.gershgorin, 2.f * faces + this->A.s[i]);
-        (this->A.s[i] > NoSink ? summary.sink : summary.noSink) = true;
-        summary.wall = summary.wall || !(static_cast<double>(diffusion(i)) > 0.);
       }
-    }
-  });
+    });
   Summary total;
   for (const Summary& summary : summaries)
   {
@@ -516,15 +521,17 @@ template <class T>
 double DiffusionSolver::norm(const RightHandSide<T>& b) const
 {
   const int nx = this->box.dims[0];
-  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(), [&](std::int64_t r) {
-    double sum = 0.;
-    for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(),
+    [&](std::int64_t r)
     {
-      const double v = b.at(i);
-      sum += v * v;
-    }
-    return sum;
-  }));
+      double sum = 0.;
+      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+      {
+        const double v = b.at(i);
+        sum += v * v;
+      }
+      return sum;
+    }));
 }
 
 template <class T>
@@ -533,23 +540,25 @@ double DiffusionSolver::residual(
 {
   const int nx = this->box.dims[0];
   const double inverse = 1. / rScale;
-  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(), [&](std::int64_t r) {
-    static thread_local std::vector<double> y;
-    y.resize(static_cast<std::size_t>(nx));
-    applyDouble(doubleRow(this->A, phi, r), y.data());
-    double sum = 0.;
-    const std::int64_t o = r * nx;
-    for (int i = 0; i < nx; ++i)
+  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(),
+    [&](std::int64_t r)
     {
-      const double v = b.at(o + i) - y[static_cast<std::size_t>(i)];
-      sum += v * v;
-      if (out)
+      static thread_local std::vector<double> y;
+      y.resize(static_cast<std::size_t>(nx));
+      applyDouble(doubleRow(this->A, phi, r), y.data());
+      double sum = 0.;
+      const std::int64_t o = r * nx;
+      for (int i = 0; i < nx; ++i)
       {
-        out[o + i] = static_cast<float>(v * inverse);
+        const double v = b.at(o + i) - y[static_cast<std::size_t>(i)];
+        sum += v * v;
+        if (out)
+        {
+          out[o + i] = static_cast<float>(v * inverse);
+        }
       }
-    }
-    return sum;
-  }));
+      return sum;
+    }));
 }
 
 //------------------------------------------------------------------------------
@@ -613,7 +622,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   int stalls = 0;
   double rz = 0.;
   double alpha = 0.;
-  const auto finish = [&](StopReason reason) {
+  const auto finish = [&](StopReason reason)
+  {
     const double last = this->residual<T>(b, phi, nullptr, 1.);
     report.fineApplications += 1.;
     report.residual = last / bNorm;
@@ -640,13 +650,15 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     double zAp = 0.;
     {
       std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()));
-      ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t row = begin; row < end; ++row)
+      ForRows(this->parallelFor, this->rows(), size,
+        [&](std::int64_t begin, std::int64_t end)
         {
-          twoDots(nx, z.data() + row * nx, r.data() + row * nx, Ap.data() + row * nx,
-            partial.data() + 2 * row);
-        }
-      });
+          for (std::int64_t row = begin; row < end; ++row)
+          {
+            twoDots(nx, z.data() + row * nx, r.data() + row * nx, Ap.data() + row * nx,
+              partial.data() + 2 * row);
+          }
+        });
       for (std::size_t i = 0; i < partial.size(); i += 2)
       {
         rzNew += partial[i];
@@ -661,10 +673,12 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     const double beta = iteration > 0 && rz > 0. ? -alpha * zAp / rz : 0.;
     rz = rzNew;
-    ForRows(this->parallelFor, this->rows(), size, [&](std::int64_t begin, std::int64_t end) {
-      combine((end - begin) * nx, static_cast<float>(beta), z.data() + begin * nx,
-        p.data() + begin * nx);
-    });
+    ForRows(this->parallelFor, this->rows(), size,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        combine((end - begin) * nx, static_cast<float>(beta), z.data() + begin * nx,
+          p.data() + begin * nx);
+      });
     // 3. alpha = r . z / p . A p
     const double pAp = Apply(this->A, p.data(), Ap.data(), this->parallelFor);
     report.fineApplications += 1.;
@@ -677,11 +691,13 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     alpha = rz / pAp;
     // 4. phi += alpha p, r -= alpha A p
     rNorm = rScale *
-      std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t row) {
-        const std::int64_t o = row * nx;
-        return update(nx, alpha * rScale, static_cast<float>(alpha), p.data() + o, Ap.data() + o,
-          phi + o, r.data() + o);
-      }));
+      std::sqrt(SumRows(this->parallelFor, this->rows(), size,
+        [&](std::int64_t row)
+        {
+          const std::int64_t o = row * nx;
+          return update(nx, alpha * rScale, static_cast<float>(alpha), p.data() + o, Ap.data() + o,
+            phi + o, r.data() + o);
+        }));
     ++report.iterations;
 
     // 5. trust only the recomputed residual, and refresh float's before its rounding shows
@@ -726,8 +742,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     if (control.progress)
     {
-      const double done = std::log(rStart / std::max(rNorm, goal)) /
-        std::log(std::max(rStart / goal, 1. + 1e-9));
+      const double done =
+        std::log(rStart / std::max(rNorm, goal)) / std::log(std::max(rStart / goal, 1. + 1e-9));
       const double fraction =
         progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
       if (!control.progress(fraction))
@@ -746,24 +762,30 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
   const int nx = this->box.dims[0];
   const double V = this->box.voxelVolume();
   const std::int64_t size = this->box.size();
-  report.emitted = !q ? 0. : V * SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
-    double sum = 0.;
-    for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
-    {
-      sum += static_cast<double>(q[i]);
-    }
-    return sum;
-  });
+  report.emitted = !q ? 0.
+                      : V *
+      SumRows(this->parallelFor, this->rows(), size,
+        [&](std::int64_t r)
+        {
+          double sum = 0.;
+          for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+          {
+            sum += static_cast<double>(q[i]);
+          }
+          return sum;
+        });
   const Buffer<float>& sinks = this->sinkWithoutShift.empty() ? this->A.s : this->sinkWithoutShift;
-  const double lost =
-    V * this->scale * SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
-      double sum = 0.;
-      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+  const double lost = V * this->scale *
+    SumRows(this->parallelFor, this->rows(), size,
+      [&](std::int64_t r)
       {
-        sum += sinks[i] > NoSink ? static_cast<double>(sinks[i]) * phi[i] : 0.;
-      }
-      return sum;
-    });
+        double sum = 0.;
+        for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+        {
+          sum += sinks[i] > NoSink ? static_cast<double>(sinks[i]) * phi[i] : 0.;
+        }
+        return sum;
+      });
   double escaped = 0.;
   const std::array<int, 3>& n = this->box.dims;
   for (int d = 0; d < 3; ++d)
@@ -795,15 +817,15 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
 
 //------------------------------------------------------------------------------
 template <class T>
-bool DiffusionSolver::steadyStateExists(
-  const T* q, bool& singular, DiffusionReport& report) const
+bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, DiffusionReport& report) const
 {
   singular = false;
   if (this->everySink || (this->anySink && !this->anyWall))
   {
     return true;
   }
-  const auto refuse = [&report](double sum, double magnitude, const std::string& where) {
+  const auto refuse = [&report](double sum, double magnitude, const std::string& where)
+  {
     std::ostringstream text;
     text << "no steady state: " << where
          << " light is neither absorbed nor can it escape, and its sources sum to " << sum
@@ -856,7 +878,8 @@ bool DiffusionSolver::steadyStateExists(
         static_cast<int>(i / stride[2]) };
       for (int d = 0; d < 3; ++d)
       {
-        const auto visit = [&](std::int64_t j) {
+        const auto visit = [&](std::int64_t j)
+        {
           if (!seen[static_cast<std::size_t>(j)])
           {
             seen[static_cast<std::size_t>(j)] = 1;
@@ -958,15 +981,17 @@ DiffusionReport DiffusionSolver::stepImplicit(
     }
     report.reason = StopReason::MaxIterations;
     // b - A phi of the steady equation is shift (phi - previous), up to this step's tolerance
-    const double change =
-      shifted * std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
-        double sum = 0.;
-        for (std::int64_t i = r * this->box.dims[0]; i < (r + 1) * this->box.dims[0]; ++i)
+    const double change = shifted *
+      std::sqrt(SumRows(this->parallelFor, this->rows(), size,
+        [&](std::int64_t r)
         {
-          sum += (phi[i] - previous[i]) * (phi[i] - previous[i]);
-        }
-        return sum;
-      }));
+          double sum = 0.;
+          for (std::int64_t i = r * this->box.dims[0]; i < (r + 1) * this->box.dims[0]; ++i)
+          {
+            sum += (phi[i] - previous[i]) * (phi[i] - previous[i]);
+          }
+          return sum;
+        }));
     if (change <= control.tolerance * qNorm)
     {
       report.reason = StopReason::Converged;
@@ -1005,15 +1030,17 @@ DiffusionReport DiffusionSolver::stepExplicit(
   const RightHandSide<T> b{ q, 1. / this->scale, nullptr, 0., 0. };
   const double qNorm = this->norm(b);
   Buffer<double> other(size);
-  report.bytes = this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
+  report.bytes =
+    this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
   double* from = phi;
   double* to = other.data();
   const double step = cdt * this->scale;
   report.reason = StopReason::MaxIterations;
   for (int i = 0; i < steps; ++i)
   {
-    const double rNorm =
-      std::sqrt(SumRows(this->parallelFor, this->rows(), size, [&](std::int64_t r) {
+    const double rNorm = std::sqrt(SumRows(this->parallelFor, this->rows(), size,
+      [&](std::int64_t r)
+      {
         double* LIGHTTRANSPORT_RESTRICT out = to + r * nx;
         const double* in = from + r * nx;
         applyDouble(doubleRow(this->A, from, r), out);
@@ -1064,7 +1091,8 @@ void DiffusionSolver::flux(const double* phi, T* E) const
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   // g = D_f / (h^2 scale): the face's flux is g h scale (phi - phi_next).
   ForRows(this->parallelFor, this->rows(), this->box.size(),
-    [&](std::int64_t begin, std::int64_t end) {
+    [&](std::int64_t begin, std::int64_t end)
+    {
       for (std::int64_t r = begin; r < end; ++r)
       {
         int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
@@ -1077,7 +1105,8 @@ void DiffusionSolver::flux(const double* phi, T* E) const
             double high = 0.;
             if (at[d] > 0)
             {
-              low = static_cast<double>(this->A.g[d][i - stride[d]]) * (phi[i - stride[d]] - phi[i]);
+              low =
+                static_cast<double>(this->A.g[d][i - stride[d]]) * (phi[i - stride[d]] - phi[i]);
             }
             else if (!this->border[d][0].empty())
             {
@@ -1095,8 +1124,7 @@ void DiffusionSolver::flux(const double* phi, T* E) const
                        this->border[d][1][static_cast<std::size_t>(this->borderIndex(d, at))]) *
                 phi[i];
             }
-            E[3 * i + d] =
-              static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
+            E[3 * i + d] = static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
           }
         }
       }

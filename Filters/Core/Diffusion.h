@@ -83,7 +83,7 @@ struct DiffusionReport
   int iterations = 0;
   /** |b - A phi| / |b|, recomputed in double from phi; in time: of the steady equation. */
   double residual = 0.;
-  double seconds = 0.; ///< this call, the set-up that it needed included
+  double seconds = 0.;    ///< this call, the set-up that it needed included
   std::int64_t bytes = 0; ///< held while solving, beyond the caller's arrays
   /** Applications of the operator on the finest grid, or sweeps that cost as much. */
   double fineApplications = 0.;

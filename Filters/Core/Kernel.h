@@ -50,7 +50,10 @@ public:
   {
     _mm_setcsr(this->state | 0x8040u); // flush to zero, denormals are zero
   }
-  ~FlushDenormals() { _mm_setcsr(this->state); }
+  ~FlushDenormals()
+  {
+    _mm_setcsr(this->state);
+  }
 #else
   FlushDenormals() = default;
 #endif
@@ -70,7 +73,8 @@ constexpr std::int64_t ParallelGrain = 32768;
 inline void ForRows(
   const ParallelFor& parallelFor, std::int64_t rows, std::int64_t values, const RangeBody& body)
 {
-  const auto flushed = [&body](std::int64_t begin, std::int64_t end) {
+  const auto flushed = [&body](std::int64_t begin, std::int64_t end)
+  {
     const FlushDenormals flush;
     body(begin, end);
   };
@@ -90,12 +94,14 @@ double SumRows(
   const ParallelFor& parallelFor, std::int64_t rows, std::int64_t values, const Row& row)
 {
   std::vector<double> partial(static_cast<std::size_t>(rows));
-  ForRows(parallelFor, rows, values, [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(parallelFor, rows, values,
+    [&](std::int64_t begin, std::int64_t end)
     {
-      partial[static_cast<std::size_t>(r)] = row(r);
-    }
-  });
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        partial[static_cast<std::size_t>(r)] = row(r);
+      }
+    });
   double sum = 0.;
   for (const double p : partial)
   {

@@ -168,8 +168,10 @@ MediumReport ComputeMedium(const Grid& grid, const ValueReader& signal, const Va
         for (std::int64_t l = 0; l < n; ++l)
         {
           const double g = D[i + l];
-          const double x = std::min(g * inverseScale, 100.); // beyond, beta is 0 anyway
-          beta[l] = g < 0. ? std::nan("") : std::exp(-x * x);
+          const double x = std::min(g * inverseScale, 1e6); // beyond, beta is 0 anyway
+          beta[l] = g < 0.        ? std::nan("")
+            : parameters.rational ? 1. / (1. + x * x)
+                                  : std::exp(-std::min(x * x, 1e4));
         }
       }
       else

@@ -94,8 +94,8 @@ void startRow(int n, int parity, const RowFaces& f, const float* LIGHTTRANSPORT_
 
 /** r = b - A x */
 LIGHTTRANSPORT_SIMD
-void residualRow(int n, const RowFaces& f, const RowView& v,
-  const float* LIGHTTRANSPORT_RESTRICT b, float* LIGHTTRANSPORT_RESTRICT r)
+void residualRow(int n, const RowFaces& f, const RowView& v, const float* LIGHTTRANSPORT_RESTRICT b,
+  float* LIGHTTRANSPORT_RESTRICT r)
 {
   const float* LIGHTTRANSPORT_RESTRICT gx = f.gx;
   const float* LIGHTTRANSPORT_RESTRICT gy = f.gy;
@@ -111,8 +111,9 @@ void residualRow(int n, const RowFaces& f, const RowView& v,
   for (int i = 0; i < n; ++i)
   {
     const float c = x[i];
-    r[i] = b[i] - (gx[i] * (c - x[i + 1]) + gx[i - 1] * (c - x[i - 1]) + gy[i] * (c - xN[i]) +
-                    gyS[i] * (c - xS[i]) + gz[i] * (c - xT[i]) + gzB[i] * (c - xB[i]) + s[i] * c);
+    r[i] = b[i] -
+      (gx[i] * (c - x[i + 1]) + gx[i - 1] * (c - x[i - 1]) + gy[i] * (c - xN[i]) +
+        gyS[i] * (c - xS[i]) + gz[i] * (c - xT[i]) + gzB[i] * (c - xB[i]) + s[i] * c);
   }
 }
 
@@ -159,34 +160,38 @@ std::int64_t rowsOf(const DiffusionOperator& A)
 }
 
 /** One half-sweep over the voxels with (i + j + k + colour) even. */
-void relax(const DiffusionOperator& A, int colour, const float* b, float* x,
-  const ParallelFor& parallelFor)
+void relax(
+  const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
 {
   const int nx = A.dims[0];
-  ForRows(parallelFor, rowsOf(A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-    Buffer<float> tmp(nx);
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(parallelFor, rowsOf(A), A.size(),
+    [&](std::int64_t begin, std::int64_t end)
     {
-      const RowView v = viewRow(A, x, r);
-      const std::int64_t o = r * nx;
-      const int parity = static_cast<int>((r % A.dims[1] + r / A.dims[1] + colour) & 1);
-      relaxRow(nx, parity, facesOfRow(A, r), v.xS, v.xN, v.xB, v.xT, b + o, tmp.data(), x + o);
-    }
-  });
+      Buffer<float> tmp(nx);
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        const RowView v = viewRow(A, x, r);
+        const std::int64_t o = r * nx;
+        const int parity = static_cast<int>((r % A.dims[1] + r / A.dims[1] + colour) & 1);
+        relaxRow(nx, parity, facesOfRow(A, r), v.xS, v.xN, v.xB, v.xT, b + o, tmp.data(), x + o);
+      }
+    });
 }
 
-void start(const DiffusionOperator& A, int colour, const float* b, float* x,
-  const ParallelFor& parallelFor)
+void start(
+  const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
 {
   const int nx = A.dims[0];
-  ForRows(parallelFor, rowsOf(A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(parallelFor, rowsOf(A), A.size(),
+    [&](std::int64_t begin, std::int64_t end)
     {
-      const std::int64_t o = r * nx;
-      const int parity = static_cast<int>((r % A.dims[1] + r / A.dims[1] + colour) & 1);
-      startRow(nx, parity, facesOfRow(A, r), b + o, x + o);
-    }
-  });
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        const std::int64_t o = r * nx;
+        const int parity = static_cast<int>((r % A.dims[1] + r / A.dims[1] + colour) & 1);
+        startRow(nx, parity, facesOfRow(A, r), b + o, x + o);
+      }
+    });
 }
 } // namespace
 
@@ -210,9 +215,8 @@ std::int64_t DiffusionOperator::bytes() const
 double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor)
 {
   const int nx = A.dims[0];
-  return SumRows(parallelFor, rowsOf(A), A.size(), [&](std::int64_t r) {
-    return applyRow(nx, facesOfRow(A, r), viewRow(A, x, r), y + r * nx);
-  });
+  return SumRows(parallelFor, rowsOf(A), A.size(),
+    [&](std::int64_t r) { return applyRow(nx, facesOfRow(A, r), viewRow(A, x, r), y + r * nx); });
 }
 
 //------------------------------------------------------------------------------
@@ -252,14 +256,17 @@ void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor
       {
         const float* g = fine->g[d].data();
         const int nx = fine->dims[0];
-        mean[d] = SumRows(parallelFor, rowsOf(*fine), fine->size(), [&](std::int64_t r) {
-          double sum = 0.;
-          for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
-          {
-            sum += static_cast<double>(g[i]);
-          }
-          return sum;
-        }) * fine->dims[d] / (static_cast<double>(fine->size()) * (fine->dims[d] - 1));
+        mean[d] = SumRows(parallelFor, rowsOf(*fine), fine->size(),
+                    [&](std::int64_t r)
+                    {
+                      double sum = 0.;
+                      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+                      {
+                        sum += static_cast<double>(g[i]);
+                      }
+                      return sum;
+                    }) *
+          fine->dims[d] / (static_cast<double>(fine->size()) * (fine->dims[d] - 1));
         largest = std::max(largest, mean[d]);
       }
     }
@@ -281,8 +288,8 @@ void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor
 }
 
 //------------------------------------------------------------------------------
-void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
-  const ParallelFor& parallelFor) const
+void Multigrid::coarsen(
+  const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
   std::array<int, 3> nc;
@@ -300,73 +307,76 @@ void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
   coarse.b.allocate(coarse.A.size());
 
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
-  ForRows(parallelFor, rowsOf(coarse.A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t row = begin; row < end; ++row)
+  ForRows(parallelFor, rowsOf(coarse.A), A.size(),
+    [&](std::int64_t begin, std::int64_t end)
     {
-      int C[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-      for (C[0] = 0; C[0] < nc[0]; ++C[0])
+      for (std::int64_t row = begin; row < end; ++row)
       {
-        int first[3];
-        int last[3];
-        for (int d = 0; d < 3; ++d)
+        int C[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+        for (C[0] = 0; C[0] < nc[0]; ++C[0])
         {
-          first[d] = fine.halved[d] ? 2 * C[d] : C[d];
-          last[d] = fine.halved[d] ? std::min(2 * C[d] + 1, n[d] - 1) : C[d];
-        }
-        double sink = 0.;
-        double conductance[3] = { 0., 0., 0. };
-        for (int k = first[2]; k <= last[2]; ++k)
-        {
-          for (int j = first[1]; j <= last[1]; ++j)
+          int first[3];
+          int last[3];
+          for (int d = 0; d < 3; ++d)
           {
-            for (int i = first[0]; i <= last[0]; ++i)
+            first[d] = fine.halved[d] ? 2 * C[d] : C[d];
+            last[d] = fine.halved[d] ? std::min(2 * C[d] + 1, n[d] - 1) : C[d];
+          }
+          double sink = 0.;
+          double conductance[3] = { 0., 0., 0. };
+          for (int k = first[2]; k <= last[2]; ++k)
+          {
+            for (int j = first[1]; j <= last[1]; ++j)
             {
-              const int at[3] = { i, j, k };
-              const std::int64_t f = i + stride[1] * j + stride[2] * k;
-              sink += static_cast<double>(A.s[f]);
-              for (int d = 0; d < 3; ++d)
+              for (int i = first[0]; i <= last[0]; ++i)
               {
-                // the voxel on this side of the upper coarse face along d, and the line through it
-                if (at[d] != last[d] || at[d] + 1 >= n[d])
+                const int at[3] = { i, j, k };
+                const std::int64_t f = i + stride[1] * j + stride[2] * k;
+                sink += static_cast<double>(A.s[f]);
+                for (int d = 0; d < 3; ++d)
                 {
-                  continue;
+                  // the voxel on this side of the upper coarse face along d, and the line through
+                  // it
+                  if (at[d] != last[d] || at[d] + 1 >= n[d])
+                  {
+                    continue;
+                  }
+                  const double between = static_cast<double>(A.g[d][f]);
+                  if (!fine.halved[d])
+                  {
+                    conductance[d] += between;
+                    continue;
+                  }
+                  if (between <= 0.)
+                  {
+                    continue; // the weights stay 0
+                  }
+                  // half of the inner face on either side; a lone last voxel is its own centre.
+                  // A closed inner face stops the line: its far end is the voxel itself.
+                  const auto half = [](double g) { return g > 0. ? 0.5 / g : 1e30; };
+                  const double here =
+                    last[d] > first[d] ? half(static_cast<double>(A.g[d][f - stride[d]])) : 0.;
+                  const std::int64_t next = f + stride[d];
+                  const bool pair = at[d] + 2 < n[d];
+                  const double there = pair ? half(static_cast<double>(A.g[d][next])) : 0.;
+                  const double face = 1. / between;
+                  const double whole = here + face + there;
+                  conductance[d] += 1. / whole;
+                  fine.w[d][f] = static_cast<std::uint8_t>(std::lround(255. * here / whole));
+                  fine.w[d][next] = static_cast<std::uint8_t>(std::lround(255. * there / whole));
                 }
-                const double between = static_cast<double>(A.g[d][f]);
-                if (!fine.halved[d])
-                {
-                  conductance[d] += between;
-                  continue;
-                }
-                if (between <= 0.)
-                {
-                  continue; // the weights stay 0
-                }
-                // half of the inner face on either side; a lone last voxel is its own centre.
-                // A closed inner face stops the line: its far end is the voxel itself.
-                const auto half = [](double g) { return g > 0. ? 0.5 / g : 1e30; };
-                const double here =
-                  last[d] > first[d] ? half(static_cast<double>(A.g[d][f - stride[d]])) : 0.;
-                const std::int64_t next = f + stride[d];
-                const bool pair = at[d] + 2 < n[d];
-                const double there = pair ? half(static_cast<double>(A.g[d][next])) : 0.;
-                const double face = 1. / between;
-                const double whole = here + face + there;
-                conductance[d] += 1. / whole;
-                fine.w[d][f] = static_cast<std::uint8_t>(std::lround(255. * here / whole));
-                fine.w[d][next] = static_cast<std::uint8_t>(std::lround(255. * there / whole));
               }
             }
           }
+          const std::int64_t c = C[0] + nc[0] * (C[1] + static_cast<std::int64_t>(nc[1]) * C[2]);
+          for (int d = 0; d < 3; ++d)
+          {
+            coarse.A.g[d][c] = static_cast<float>(conductance[d]);
+          }
+          coarse.A.s[c] = static_cast<float>(sink);
         }
-        const std::int64_t c = C[0] + nc[0] * (C[1] + static_cast<std::int64_t>(nc[1]) * C[2]);
-        for (int d = 0; d < 3; ++d)
-        {
-          coarse.A.g[d][c] = static_cast<float>(conductance[d]);
-        }
-        coarse.A.s[c] = static_cast<float>(sink);
       }
-    }
-  });
+    });
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
 }
@@ -374,21 +384,23 @@ void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
 void CloseIsolated(DiffusionOperator& A, float isolated, const ParallelFor& parallelFor)
 {
   const int nx = A.dims[0];
-  ForRows(parallelFor, rowsOf(A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t r = begin; r < end; ++r)
+  ForRows(parallelFor, rowsOf(A), A.size(),
+    [&](std::int64_t begin, std::int64_t end)
     {
-      const RowFaces f = facesOfRow(A, r);
-      float* s = A.s.data() + r * nx;
-      for (int i = 0; i < nx; ++i)
+      for (std::int64_t r = begin; r < end; ++r)
       {
-        const float den = f.gx[i] + f.gx[i - 1] + f.gy[i] + f.gyS[i] + f.gz[i] + f.gzB[i] + s[i];
-        if (!(den > 1e-30f))
+        const RowFaces f = facesOfRow(A, r);
+        float* s = A.s.data() + r * nx;
+        for (int i = 0; i < nx; ++i)
         {
-          s[i] = isolated;
+          const float den = f.gx[i] + f.gx[i - 1] + f.gy[i] + f.gyS[i] + f.gz[i] + f.gzB[i] + s[i];
+          if (!(den > 1e-30f))
+          {
+            s[i] = isolated;
+          }
         }
       }
-    }
-  });
+    });
 }
 
 //------------------------------------------------------------------------------
@@ -417,17 +429,20 @@ void Multigrid::cycle(std::size_t l, const DiffusionOperator& A, const float* b,
     const std::array<int, 3>& nc = coarse.A.dims;
     const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
     float* r = fine.r.data();
-    ForRows(parallelFor, rowsOf(A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t row = begin; row < end; ++row)
+    ForRows(parallelFor, rowsOf(A), A.size(),
+      [&](std::int64_t begin, std::int64_t end)
       {
-        residualRow(n[0], facesOfRow(A, row), viewRow(A, x, row), b + row * n[0], r + row * n[0]);
-      }
-    });
+        for (std::int64_t row = begin; row < end; ++row)
+        {
+          residualRow(n[0], facesOfRow(A, row), viewRow(A, x, row), b + row * n[0], r + row * n[0]);
+        }
+      });
     // 3. restriction, the transpose of the prolongation
     const bool* halved = fine.halved.data();
     constexpr float unit = 1.f / 255.f;
     const std::uint8_t* w[3] = { fine.w[0].data(), fine.w[1].data(), fine.w[2].data() };
-    const auto own = [&](std::int64_t f) {
+    const auto own = [&](std::int64_t f)
+    {
       float sum = 0.f;
       for (int d = 0; d < 3; ++d)
       {
@@ -435,82 +450,86 @@ void Multigrid::cycle(std::size_t l, const DiffusionOperator& A, const float* b,
       }
       return 1.f - sum;
     };
-    ForRows(parallelFor, rowsOf(coarse.A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t row = begin; row < end; ++row)
+    ForRows(parallelFor, rowsOf(coarse.A), A.size(),
+      [&](std::int64_t begin, std::int64_t end)
       {
-        int C[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-        for (C[0] = 0; C[0] < nc[0]; ++C[0])
+        for (std::int64_t row = begin; row < end; ++row)
         {
-          int first[3];
-          int last[3];
-          for (int d = 0; d < 3; ++d)
+          int C[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+          for (C[0] = 0; C[0] < nc[0]; ++C[0])
           {
-            first[d] = halved[d] ? 2 * C[d] : C[d];
-            last[d] = halved[d] ? std::min(2 * C[d] + 1, n[d] - 1) : C[d];
-          }
-          float sum = 0.f;
-          for (int k = first[2]; k <= last[2]; ++k)
-          {
-            for (int j = first[1]; j <= last[1]; ++j)
+            int first[3];
+            int last[3];
+            for (int d = 0; d < 3; ++d)
             {
-              for (int i = first[0]; i <= last[0]; ++i)
+              first[d] = halved[d] ? 2 * C[d] : C[d];
+              last[d] = halved[d] ? std::min(2 * C[d] + 1, n[d] - 1) : C[d];
+            }
+            float sum = 0.f;
+            for (int k = first[2]; k <= last[2]; ++k)
+            {
+              for (int j = first[1]; j <= last[1]; ++j)
               {
-                const std::int64_t f = i + stride[1] * j + stride[2] * k;
-                sum += own(f) * r[f];
-                const int at[3] = { i, j, k };
-                for (int d = 0; d < 3; ++d)
+                for (int i = first[0]; i <= last[0]; ++i)
                 {
-                  if (!halved[d])
+                  const std::int64_t f = i + stride[1] * j + stride[2] * k;
+                  sum += own(f) * r[f];
+                  const int at[3] = { i, j, k };
+                  for (int d = 0; d < 3; ++d)
                   {
-                    continue;
-                  }
-                  if (at[d] == first[d] && at[d] > 0)
-                  {
-                    const std::int64_t q = f - stride[d];
-                    sum += unit * static_cast<float>(w[d][q]) * r[q];
-                  }
-                  if (at[d] == last[d] && at[d] + 1 < n[d])
-                  {
-                    const std::int64_t q = f + stride[d];
-                    sum += unit * static_cast<float>(w[d][q]) * r[q];
+                    if (!halved[d])
+                    {
+                      continue;
+                    }
+                    if (at[d] == first[d] && at[d] > 0)
+                    {
+                      const std::int64_t q = f - stride[d];
+                      sum += unit * static_cast<float>(w[d][q]) * r[q];
+                    }
+                    if (at[d] == last[d] && at[d] + 1 < n[d])
+                    {
+                      const std::int64_t q = f + stride[d];
+                      sum += unit * static_cast<float>(w[d][q]) * r[q];
+                    }
                   }
                 }
               }
             }
+            coarse.b[C[0] + row * nc[0]] = sum;
           }
-          coarse.b[C[0] + row * nc[0]] = sum;
         }
-      }
-    });
+      });
     this->cycle(l + 1, coarse.A, coarse.b.data(), coarse.x.data(), parallelFor);
     // 3. prolongation
     const std::int64_t strideC[3] = { 1, nc[0], static_cast<std::int64_t>(nc[0]) * nc[1] };
     const float* xc = coarse.x.data();
-    ForRows(parallelFor, rowsOf(A), A.size(), [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t row = begin; row < end; ++row)
+    ForRows(parallelFor, rowsOf(A), A.size(),
+      [&](std::int64_t begin, std::int64_t end)
       {
-        int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-        for (at[0] = 0; at[0] < n[0]; ++at[0])
+        for (std::int64_t row = begin; row < end; ++row)
         {
-          const std::int64_t f = at[0] + row * n[0];
-          std::int64_t c = 0;
-          for (int d = 0; d < 3; ++d)
+          int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+          for (at[0] = 0; at[0] < n[0]; ++at[0])
           {
-            c += strideC[d] * (halved[d] ? at[d] / 2 : at[d]);
-          }
-          float value = xc[c];
-          for (int d = 0; d < 3; ++d)
-          {
-            if (halved[d] && w[d][f] != 0)
+            const std::int64_t f = at[0] + row * n[0];
+            std::int64_t c = 0;
+            for (int d = 0; d < 3; ++d)
             {
-              const std::int64_t q = (at[d] & 1) ? c + strideC[d] : c - strideC[d];
-              value += unit * static_cast<float>(w[d][f]) * (xc[q] - xc[c]);
+              c += strideC[d] * (halved[d] ? at[d] / 2 : at[d]);
             }
+            float value = xc[c];
+            for (int d = 0; d < 3; ++d)
+            {
+              if (halved[d] && w[d][f] != 0)
+              {
+                const std::int64_t q = (at[d] & 1) ? c + strideC[d] : c - strideC[d];
+                value += unit * static_cast<float>(w[d][f]) * (xc[q] - xc[c]);
+              }
+            }
+            x[f] += value;
           }
-          x[f] += value;
         }
-      }
-    });
+      });
   }
   // 4. smooth: black then red
   for (int sweep = 0; sweep < this->sweeps; ++sweep)

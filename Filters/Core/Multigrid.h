@@ -94,8 +94,8 @@ private:
   };
   void cycle(std::size_t l, const DiffusionOperator& A, const float* b, float* x,
     const ParallelFor& parallelFor);
-  void coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
-    const ParallelFor& parallelFor) const;
+  void coarsen(
+    const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const;
 
   const DiffusionOperator* finest = nullptr;
   std::deque<Level> levels;

@@ -34,8 +34,8 @@ void expectSolved(Suite& suite, const std::string& name, DiffusionScene& scene, 
     most = std::max(most, phi);
   }
   std::cout << name << ": " << ToString(report.reason) << ", " << report.iterations
-            << " iterations, residual " << report.residual << " (here " << residual
-            << "), min/max " << least / most << ", balance "
+            << " iterations, residual " << report.residual << " (here " << residual << "), min/max "
+            << least / most << ", balance "
             << (report.absorbed + report.escaped) / report.emitted - 1. << " " << report.message
             << "\n";
   suite.check(report.reason == StopReason::Converged, name + " converges", __FILE__, __LINE__);
@@ -65,9 +65,10 @@ void hardMedia(Suite& suite)
   }
   {
     DiffusionScene scene({ { 32, 32, 32 } }, { { 1., 1., 1. } });
-    scene.fill(scene.D, [](double x, double y, double z) {
-      return (static_cast<int>(x) + static_cast<int>(y) + static_cast<int>(z)) % 2 ? 1e-8 : 1.;
-    });
+    scene.fill(scene.D,
+      [](double x, double y, double z) {
+        return (static_cast<int>(x) + static_cast<int>(y) + static_cast<int>(z)) % 2 ? 1e-8 : 1.;
+      });
     scene.sigma_a.assign(scene.q.size(), 1e-4);
     scene.q[index(scene, 16, 16, 16)] = 1.;
     expectSolved(suite, "checkerboard 1e8", scene, 60);
@@ -82,12 +83,14 @@ void hardMedia(Suite& suite)
     // a winding corridor of one voxel, and nothing but its ends lets light out
     DiffusionScene scene({ { 33, 33, 3 } }, { { 1., 1., 1. } });
     scene.boundary = Boundary::ZeroFlux;
-    scene.fill(scene.D, [](double x, double y, double z) {
-      const int i = static_cast<int>(x);
-      const int j = static_cast<int>(y);
-      const bool open = static_cast<int>(z) == 1 && (j % 2 == 1 || i == ((j / 2) % 2 ? 1 : 31));
-      return open ? 1. : 1e-6;
-    });
+    scene.fill(scene.D,
+      [](double x, double y, double z)
+      {
+        const int i = static_cast<int>(x);
+        const int j = static_cast<int>(y);
+        const bool open = static_cast<int>(z) == 1 && (j % 2 == 1 || i == ((j / 2) % 2 ? 1 : 31));
+        return open ? 1. : 1e-6;
+      });
     scene.sigma_a.assign(scene.q.size(), 1e-4);
     scene.q[index(scene, 1, 1, 1)] = 1.;
     expectSolved(suite, "labyrinth", scene, 200);
@@ -162,10 +165,12 @@ void noAnswer(Suite& suite)
 
   // a closed room in an open world
   DiffusionScene room({ { 9, 9, 9 } }, { { 1., 1., 1. } });
-  room.fill(room.D, [](double x, double y, double z) {
-    const double d = std::max(std::max(std::abs(x - 4.5), std::abs(y - 4.5)), std::abs(z - 4.5));
-    return d > 1.2 && d < 2.2 ? 0. : 1.;
-  });
+  room.fill(room.D,
+    [](double x, double y, double z)
+    {
+      const double d = std::max(std::max(std::abs(x - 4.5), std::abs(y - 4.5)), std::abs(z - 4.5));
+      return d > 1.2 && d < 2.2 ? 0. : 1.;
+    });
   room.q[index(room, 4, 4, 4)] = 1.;
   report = room.solve();
   LT_CHECK(suite, report.reason == StopReason::NoSteadyState);
@@ -203,7 +208,8 @@ void stops(Suite& suite)
   scene.q[index(scene, 5, 6, 7)] = 1.;
   // more than double can give: an honest stop, the best answer kept
   DiffusionReport report = scene.solve(1e-19);
-  LT_CHECK(suite, report.reason == StopReason::Breakdown || report.reason == StopReason::MaxIterations);
+  LT_CHECK(
+    suite, report.reason == StopReason::Breakdown || report.reason == StopReason::MaxIterations);
   LT_CHECK(suite, report.residual < 1e-13);
   LT_CHECK(suite, report.iterations < 100);
 
@@ -219,7 +225,8 @@ void stops(Suite& suite)
   int calls = 0;
   double last = -1.;
   bool rising = true;
-  control.progress = [&](double fraction) {
+  control.progress = [&](double fraction)
+  {
     rising = rising && fraction >= last - 0.05 && fraction <= 1.;
     last = fraction;
     return ++calls < 4;

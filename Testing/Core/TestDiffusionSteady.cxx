@@ -36,7 +36,8 @@ void slab(Suite& suite)
         const double mu = std::sqrt(sigma / D);
         const double twoA =
           boundary == Boundary::Robin ? 2. * BoundaryFactor(eta) : 0.; // Absorbing: A = 0
-        const auto exact = [&](double x) {
+        const auto exact = [&](double x)
+        {
           if (boundary == Boundary::ZeroFlux)
           {
             return 2. / sigma;
@@ -62,7 +63,9 @@ void slab(Suite& suite)
           const DiffusionReport report = scene.solve(1e-12);
           LT_CHECK(suite, report.reason == StopReason::Converged);
           error[level] = scene.worst(
-            [&](double x, double y, double z) { return exact(axis == 0 ? x : axis == 1 ? y : z); });
+            [&](double x, double y, double z) {
+              return exact(axis == 0 ? x : axis == 1 ? y : z);
+            });
           LT_CHECK_CLOSE(suite, report.absorbed + report.escaped, report.emitted, 1e-9);
           // the flux through the border is what escapes: D phi' there, closed form
           if (boundary == Boundary::ZeroFlux)
@@ -70,8 +73,8 @@ void slab(Suite& suite)
             LT_CHECK_NEAR(suite, report.escaped, 0., 1e-12);
           }
         }
-        std::cout << "slab, axis " << axis << ", boundary " << static_cast<int>(boundary) << ", eta " << eta
-                  << ": " << error[0] << ", " << error[1] << "\n";
+        std::cout << "slab, axis " << axis << ", boundary " << static_cast<int>(boundary)
+                  << ", eta " << eta << ": " << error[0] << ", " << error[1] << "\n";
         LT_CHECK(suite, error[1] < 1e-3);
         LT_CHECK(suite, boundary == Boundary::ZeroFlux || order(error[0], error[1]) > 1.85);
       }
@@ -84,9 +87,8 @@ void eigenfunction(Suite& suite)
 {
   const double D = 0.5;
   const double sigma = 2.;
-  const auto exact = [](double x, double y, double z) {
-    return std::sin(Pi * x) * std::sin(Pi * y) * std::sin(Pi * z);
-  };
+  const auto exact = [](double x, double y, double z)
+  { return std::sin(Pi * x) * std::sin(Pi * y) * std::sin(Pi * z); };
   double error[2];
   for (int level = 0; level < 2; ++level)
   {
@@ -110,15 +112,15 @@ void eigenfunction(Suite& suite)
  */
 void manufactured(Suite& suite)
 {
-  const auto D = [](double x, double y, double z) {
-    return 1. + 0.6 * std::sin(2. * x + 1.) * std::cos(3. * y) * std::cos(z);
-  };
-  const auto exact = [](double x, double y, double z) {
-    return 2. + std::cos(Pi * x) * std::cos(2. * Pi * y) * std::cos(Pi * z);
-  };
+  const auto D = [](double x, double y, double z)
+  { return 1. + 0.6 * std::sin(2. * x + 1.) * std::cos(3. * y) * std::cos(z); };
+  const auto exact = [](double x, double y, double z)
+  { return 2. + std::cos(Pi * x) * std::cos(2. * Pi * y) * std::cos(Pi * z); };
   const double sigma = 1.5;
-  const auto source = [&](double sign) {
-    return [=](double x, double y, double z) {
+  const auto source = [&](double sign)
+  {
+    return [=](double x, double y, double z)
+    {
       const double dDx = 1.2 * std::cos(2. * x + 1.) * std::cos(3. * y) * std::cos(z);
       const double dDy = -1.8 * std::sin(2. * x + 1.) * std::sin(3. * y) * std::cos(z);
       const double dDz = -0.6 * std::sin(2. * x + 1.) * std::cos(3. * y) * std::sin(z);
@@ -163,7 +165,8 @@ void pointSource(Suite& suite)
 {
   const double sigma = 0.1;
   const double D = 1. / (3. * (sigma + 10.));
-  const auto fluence = [&](int perUnit, double r) {
+  const auto fluence = [&](int perUnit, double r)
+  {
     const int n = 5 * perUnit + 1;
     const double h = 1. / perUnit;
     DiffusionScene scene({ { n, n, n } }, { { h, h, h } });

@@ -39,8 +39,8 @@ void eigenmode(Suite& suite)
 
   const int steps = 7;
   scene.fill(scene.phi, mode);
-  DiffusionReport report =
-    solver.stepExplicit(static_cast<const double*>(nullptr), scene.phi.data(), steps, bound, control);
+  DiffusionReport report = solver.stepExplicit(
+    static_cast<const double*>(nullptr), scene.phi.data(), steps, bound, control);
   LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.iterations == steps);
   double factor = std::pow(1. - lambda * bound, steps);
   LT_CHECK_NEAR(suite,
@@ -59,8 +59,7 @@ void eigenmode(Suite& suite)
   scene.q.assign(scene.q.size(), 1.);
   scene.phi.assign(scene.phi.size(), 0.);
   report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
-  LT_CHECK_NEAR(
-    suite, scene.worst([&](double, double, double) { return 1. / sigma; }), 0., 1e-6);
+  LT_CHECK_NEAR(suite, scene.worst([&](double, double, double) { return 1. / sigma; }), 0., 1e-6);
 }
 
 DiffusionScene randomScene(unsigned int seed, std::array<int, 3> dims, double decades)
@@ -86,7 +85,8 @@ void steadyReached(Suite& suite)
   solver.setMedium(steady.medium());
   DiffusionControl control;
   control.tolerance = 1e-9;
-  const auto difference = [&](const std::vector<double>& phi) {
+  const auto difference = [&](const std::vector<double>& phi)
+  {
     double d = 0.;
     double m = 0.;
     for (std::size_t i = 0; i < phi.size(); ++i)
@@ -97,13 +97,13 @@ void steadyReached(Suite& suite)
     return d / m;
   };
   std::vector<double> phi(steady.phi.size(), 0.);
-  DiffusionReport report = solver.stepExplicit(
-    steady.q.data(), phi.data(), 20000, solver.positivityBound(), control);
+  DiffusionReport report =
+    solver.stepExplicit(steady.q.data(), phi.data(), 20000, solver.positivityBound(), control);
   LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations < 20000);
   LT_CHECK_NEAR(suite, difference(phi), 0., 1e-6);
   phi.assign(phi.size(), 0.);
-  report = solver.stepExplicit(
-    steady.q.data(), phi.data(), 20000, solver.stabilityBound(), control);
+  report =
+    solver.stepExplicit(steady.q.data(), phi.data(), 20000, solver.stabilityBound(), control);
   LT_CHECK(suite, report.reason == StopReason::Converged);
   LT_CHECK_NEAR(suite, difference(phi), 0., 1e-6);
   phi.assign(phi.size(), 0.);
@@ -188,8 +188,8 @@ void stored(Suite& suite)
   {
     before += phi;
   }
-  solver.stepExplicit(static_cast<const double*>(nullptr), scene.phi.data(), 500,
-    solver.positivityBound(), control);
+  solver.stepExplicit(
+    static_cast<const double*>(nullptr), scene.phi.data(), 500, solver.positivityBound(), control);
   for (const double phi : scene.phi)
   {
     after += phi;
@@ -197,8 +197,8 @@ void stored(Suite& suite)
   LT_CHECK_CLOSE(suite, after, before, 1e-12);
   int calls = 0;
   control.progress = [&calls](double) { return ++calls < 4; };
-  const DiffusionReport report = solver.stepExplicit(
-    scene.q.data(), scene.phi.data(), 500, solver.positivityBound(), control);
+  const DiffusionReport report =
+    solver.stepExplicit(scene.q.data(), scene.phi.data(), 500, solver.positivityBound(), control);
   LT_CHECK(suite, report.reason == StopReason::Cancelled && report.iterations == 4);
 }
 } // namespace
