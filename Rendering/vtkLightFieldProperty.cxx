@@ -188,6 +188,7 @@ void vtkLightFieldProperty::SetPositiveColorMap(vtkColorTransferFunction* map)
   if (this->PositiveColorMap != map)
   {
     this->PositiveColorMap = map ? map : makeColors(Warm).Get();
+    this->ExchangeTime.Modified();
     this->Modified();
   }
 }
@@ -198,6 +199,7 @@ void vtkLightFieldProperty::SetNegativeColorMap(vtkColorTransferFunction* map)
   if (this->NegativeColorMap != map)
   {
     this->NegativeColorMap = map ? map : makeColors(Cold).Get();
+    this->ExchangeTime.Modified();
     this->Modified();
   }
 }
@@ -208,6 +210,7 @@ void vtkLightFieldProperty::SetLightOpacityFunction(vtkPiecewiseFunction* functi
   if (this->LightOpacityFunction != function)
   {
     this->LightOpacityFunction = function ? function : makeOpacity().Get();
+    this->ExchangeTime.Modified();
     this->Modified();
   }
 }
@@ -283,10 +286,16 @@ void vtkLightFieldProperty::MapValue(double phi, double maximum, double rgba[4])
 }
 
 //------------------------------------------------------------------------------
+vtkMTimeType vtkLightFieldProperty::GetTableMTime()
+{
+  return std::max({ this->ExchangeTime.GetMTime(), this->PositiveColorMap->GetMTime(),
+    this->NegativeColorMap->GetMTime(), this->LightOpacityFunction->GetMTime() });
+}
+
+//------------------------------------------------------------------------------
 vtkMTimeType vtkLightFieldProperty::GetMTime()
 {
-  return std::max({ this->Superclass::GetMTime(), this->PositiveColorMap->GetMTime(),
-    this->NegativeColorMap->GetMTime(), this->LightOpacityFunction->GetMTime() });
+  return std::max(this->Superclass::GetMTime(), this->GetTableMTime());
 }
 
 //------------------------------------------------------------------------------

@@ -32,11 +32,13 @@
  *   the light itself is a glowing medium of that colour which hides the
  *   fraction o of what is behind it per LightOpacityUnitDistance. So a lit
  *   cavity shows although the transfer function makes it transparent.
- * - Illuminate: the sample's colour is multiplied by 1 + Strength (t - 1).
- *   Unlit tissue becomes dark; a negative fluence is no light. Opacity stays.
+ * - Illuminate: the tissue's colour is multiplied by 0.3 + 2.7 t (to 1 as
+ *   Strength goes to 0), at most to white. Unlit tissue becomes dark; a negative
+ *   fluence is no light.
  * - FluxDirection: as Overlay, with the flux E in place of phi: t from |E|, the
- *   colour t (|Ex|, |Ey|, |Ez|) / |E| as in diffusion tensor imaging (along x
- *   red, y green, z blue; patient axes if the world's axes are those).
+ *   colour (0.3 + 0.7 t) (|Ex|, |Ey|, |Ez|) / max(|Ex|, |Ey|, |Ez|), whose hue is
+ *   that of diffusion tensor imaging: along x red, y green, z blue (patient axes
+ *   if the world's axes are those).
  *
  * Changes of anything but Mode never rebuild a shader.
  *
@@ -171,9 +173,12 @@ public:
 
   ///@{
   /**
-   * Factor on the opacity of samples without light, in [0,1] (clamped); 1 by
-   * default. Lower it to look through opaque tissue at the light inside; lit
-   * samples keep their opacity. Strength fades it in.
+   * Factor on the opacity of samples without light, in [0,1] (clamped); 0.4 by
+   * default, so that the tissue in front veils the light less. Lit samples keep
+   * their opacity: the factor is 1 - (1 - TissueOpacity) Strength (1 - lit), where
+   * lit is LightOpacityFunction(t), or t in Illuminate. 1 leaves the tissue as the
+   * transfer function has it; 0.02 looks into a volume whose samples are opaque.
+   * Composite and isosurface blending only.
    */
   void SetTissueOpacity(double factor);
   vtkGetMacro(TissueOpacity, double);
@@ -198,6 +203,9 @@ public:
   /** Also counts the colour maps and the opacity function. */
   vtkMTimeType GetMTime() override;
 
+  /** Of the colour maps and the opacity function alone: when a table made of them is old. */
+  vtkMTimeType GetTableMTime();
+
 protected:
   vtkLightFieldProperty();
   ~vtkLightFieldProperty() override;
@@ -210,12 +218,13 @@ protected:
   bool AutomaticWindow = true;
   double LightOpacity = 0.9;
   double LightOpacityUnitDistance = 0.;
-  double TissueOpacity = 1.;
+  double TissueOpacity = 0.4;
   vtkSmartPointer<vtkColorTransferFunction> PositiveColorMap;
   vtkSmartPointer<vtkColorTransferFunction> NegativeColorMap;
   vtkSmartPointer<vtkPiecewiseFunction> LightOpacityFunction;
 
 private:
+  vtkTimeStamp ExchangeTime; // of one of the three functions
   void SetClamped(double& member, double value, double lo, double hi, const char* name);
 
   vtkLightFieldProperty(const vtkLightFieldProperty&) = delete;

@@ -53,6 +53,9 @@
 
 namespace
 {
+/** Entries of a colour map's table. */
+constexpr int MapSize = 2048;
+
 /** LT_BLEND of the shader parts; NoLight: the superclass's picture. */
 enum BlendClass
 {
@@ -238,7 +241,7 @@ public:
   std::string CheckArray(vtkImageData* image, int mode, vtkDataArray*& array);
   std::string Upload(
     vtkOpenGLRenderWindow* window, vtkDataArray* array, const int dimensions[3], bool half);
-  void UploadMap(vtkOpenGLRenderWindow* window);
+  bool UploadMapIfChanged(vtkOpenGLRenderWindow* window);
   void ComputeDatasetToFC();
   void Release(vtkWindow* window);
 };
@@ -317,6 +320,7 @@ bool vtkLightTransportVolumeMapper::vtkShaderPass::SetShaderParameters(
   program->SetUniformi("in_ltField", self.FieldTexture->GetTextureUnit());
   self.MapTexture->Activate();
   program->SetUniformi("in_ltMap", self.MapTexture->GetTextureUnit());
+  program->SetUniformf("in_ltMapLast", static_cast<float>(MapSize - 1));
 
   // t = slope * x + offset with x = |field| or log2 |field|, as stored. The
   // differences are taken here in double.
@@ -438,10 +442,9 @@ std::string vtkLightTransportVolumeMapper::vtkInternals::Upload(
   texture->ReleaseGraphicsResources(window);
   texture->SetContext(window);
   texture->ResetFormatAndType();
-  if (half)
-  {
-    texture->SetInternalFormat(components == 1 ? GL_R16F : GL_RGB16F);
-  }
+  // Three channels are padded to four by GPUs, and slower than four on llvmpipe.
+  texture->SetInternalFormat(
+    components == 1 ? (half ? GL_R16F : GL_R32F) : (half ? GL_RGBA16F : GL_RGBA32F));
   texture->SetWrapS(vtkTextureObject::ClampToEdge);
   texture->SetWrapT(vtkTextureObject::ClampToEdge);
   texture->SetWrapR(vtkTextureObject::ClampToEdge);
@@ -460,9 +463,16 @@ std::string vtkLightTransportVolumeMapper::vtkInternals::Upload(
 }
 
 //------------------------------------------------------------------------------
-void vtkLightTransportVolumeMapper::vtkInternals::UploadMap(vtkOpenGLRenderWindow* window)
+bool vtkLightTransportVolumeMapper::vtkInternals::UploadMapIfChanged(vtkOpenGLRenderWindow* window)
 {
-  constexpr int size = 1024;
+  // Exchanging a function for another one shows in the property's table time.
+  const vtkMTimeType time = this->Property->GetTableMTime();
+  if (this->UploadedMapTime == time && this->MapTexture->GetHandle())
+  {
+    return false;
+  }
+  this->UploadedMapTime = time;
+  constexpr int size = MapSize;
   std::vector<float> table(2 * 4 * size);
   std::vector<double> colors(3 * size);
   std::vector<double> opacities(size);
@@ -486,9 +496,10 @@ void vtkLightTransportVolumeMapper::vtkInternals::UploadMap(vtkOpenGLRenderWindo
   texture->SetContext(window);
   texture->SetWrapS(vtkTextureObject::ClampToEdge);
   texture->SetWrapT(vtkTextureObject::ClampToEdge);
-  texture->SetMinificationFilter(vtkTextureObject::Linear);
-  texture->SetMagnificationFilter(vtkTextureObject::Linear);
+  texture->SetMinificationFilter(vtkTextureObject::Nearest);
+  texture->SetMagnificationFilter(vtkTextureObject::Nearest);
   texture->Create2DFromRaw(size, 2, 4, VTK_FLOAT, table.data());
+  return true;
 }
 
 //------------------------------------------------------------------------------
@@ -759,10 +770,8 @@ bool vtkLightTransportVolumeMapper::PrepareLight(vtkRenderer* renderer, vtkVolum
     return false;
   }
   this->ReportOnce(std::string());
-  if (self.UploadedMapTime != property->GetMTime() || !self.MapTexture->GetHandle())
+  if (self.UploadMapIfChanged(window))
   {
-    self.UploadMap(window);
-    self.UploadedMapTime = property->GetMTime();
     ++this->NumberOfColorMapUploads;
   }
 

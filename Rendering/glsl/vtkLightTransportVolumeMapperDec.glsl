@@ -20,6 +20,7 @@
 
 uniform sampler3D in_ltField; // phi or E over the field's maximum
 uniform sampler2D in_ltMap;   // over t: rgb colour, a how lit; row 0 phi > 0, row 1 phi < 0
+uniform float in_ltMapLast;   // its last column
 uniform mat4 in_ltDatasetToFC;
 uniform int in_ltLogarithmic;
 uniform vec2 in_ltWindow;      // t = slope * (log2) |field| + offset
@@ -65,17 +66,30 @@ vec4 ltLight(ltFieldValue field)
 {
   float magnitude = ltMagnitude(field);
   float t = ltPosition(magnitude);
-  float size = float(textureSize(in_ltMap, 0).x);
-  float u = (t * (size - 1.0) + 0.5) / size;
+  // The nearest of many entries: half the cost of a filtered look-up on llvmpipe.
+  ivec2 entry = ivec2(int(t * in_ltMapLast + 0.5), 0);
 #if LT_MODE == 2
-  vec4 light = texture(in_ltMap, vec2(u, 0.25));
-  light.rgb = t * abs(field) / max(magnitude, 1e-37);
+  vec4 light = texelFetch(in_ltMap, entry, 0);
+  vec3 direction = abs(field) / max(magnitude, 1e-37);
+  float strongest = max(max(direction.x, direction.y), max(direction.z, 1e-3));
+  light.rgb = (0.3 + 0.7 * t) * direction / strongest;
 #else
-  vec4 light = texture(in_ltMap, vec2(u, field < 0.0 ? 0.75 : 0.25));
+  entry.y = field < 0.0 ? 1 : 0;
+  vec4 light = texelFetch(in_ltMap, entry, 0);
 #endif
   light.a = t > 0.0 ? light.a : 0.0;
   return light;
 }
+
+#if LT_MODE == 1
+// The premultiplied colour of tissue in the light, and how lit in [0,1].
+vec3 ltIlluminate(vec4 tissue, float phi, out float lit)
+{
+  lit = phi > 0.0 ? ltPosition(phi) : 0.0;
+  float factor = mix(1.0, 0.3 + 2.7 * lit, in_ltStrength);
+  return min(factor * tissue.rgb, max(tissue.rgb, vec3(tissue.a)));
+}
+#endif
 
 #if LT_BLEND == 0 || LT_BLEND == 1
 // The sample lies between before and after (both premultiplied, front to back);
@@ -84,8 +98,8 @@ vec4 ltCompose(vec4 before, vec4 after, ltFieldValue field)
 {
   vec4 tissue = after - before;
 #if LT_MODE == 1
-  float lit = field > 0.0 ? ltPosition(field) : 0.0;
-  tissue.rgb *= 1.0 + in_ltStrength * (lit - 1.0);
+  float lit;
+  tissue.rgb = ltIlluminate(tissue, field, lit);
 #else
   vec4 light = ltLight(field);
   float lit = light.a;
@@ -112,8 +126,8 @@ float g_ltProjectedMagnitude;
 vec4 ltComposeProjection(vec4 projection)
 {
 #if LT_MODE == 1
-  float lit = g_ltProjected > 0.0 ? ltPosition(g_ltProjected) : 0.0;
-  return vec4(projection.rgb * (1.0 + in_ltStrength * (lit - 1.0)), projection.a);
+  float lit;
+  return vec4(ltIlluminate(projection, g_ltProjected, lit), projection.a);
 #else
   vec4 light = ltLight(g_ltProjected);
   light.a *= in_ltStrength * in_ltLightOpacity;
