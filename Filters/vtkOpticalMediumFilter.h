@@ -145,12 +145,13 @@ public:
   /**
    * sigma, in scalar units per length (1/length for FromTransferFunctionGradient):
    * beta is 1/e where the gradient has this length. Finite, >= 0.
-   * The default 0 chooses it from the data: the gradient lengths of flat regions
-   * are a noise, whose level is found robustly, and sigma is set safely above it
-   * (see lighttransport::ChooseGradientScale in Filters/Core/Medium.h for the
-   * rule), in the neighbourhood of ScalePoint if there is one, else in the whole
-   * volume. It follows when the scalars are rescaled. Too small, and noise stops
-   * light after a few voxels; too large, and light passes through weak edges.
+   * The default 0 chooses it from the data, 2.1 times the median gradient of the
+   * regions that vary (Black et al.: Robust anisotropic diffusion, 1998; the rule
+   * is in Filters/Core/Medium.h), in the neighbourhood of ScalePoint if there is
+   * one, else in the whole volume. It follows when the scalars or the lengths are
+   * rescaled. Too small, and noise stops light after a few voxels; too large, and
+   * light passes through weak edges. Near the point where light starts the choice
+   * is better: set ScalePoint.
    */
   vtkSetMacro(GradientScale, double);
   vtkGetMacro(GradientScale, double);

@@ -14,7 +14,7 @@ namespace
 {
 constexpr std::int64_t MaximumSamples = 1 << 20;
 constexpr std::int64_t MinimumSamples = 64;
-constexpr double NeighbourhoodSpacings = 14.;
+constexpr double NeighbourhoodSpacings = 20.;
 constexpr double FlatFraction = 0.01;
 constexpr std::int64_t ReadLength = 4096;
 constexpr int MapSteps = 4;
@@ -30,17 +30,7 @@ double Quantile(std::vector<float>& samples, double fraction)
 /** The rule on positive samples. */
 double RobustScale(std::vector<float>& samples)
 {
-  const double median = Quantile(samples, 0.5);
-  for (float& g : samples)
-  {
-    g = static_cast<float>(std::abs(g - median));
-  }
-  double deviation = Quantile(samples, 0.5);
-  if (deviation <= 1e-3 * median)
-  {
-    deviation = median;
-  }
-  return std::sqrt(2.) * 1.4826 * deviation;
+  return std::sqrt(2.) * 1.4826 * Quantile(samples, 0.5);
 }
 
 /** A stride that meets every row, column and slice in turn. */

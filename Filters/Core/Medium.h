@@ -15,21 +15,21 @@ namespace lighttransport
 /**
  * The gradient scale sigma of beta = exp(-(g / sigma)^2), chosen from gradient
  * lengths g by the robust rule of Black, Sapiro, Marimont, Heeger: Robust
- * anisotropic diffusion, IEEE Trans. Image Processing 7(3), 1998:
+ * anisotropic diffusion, IEEE Trans. Image Processing 7(3), 1998: with the median
+ * absolute deviation of the gradients, whose own median is 0 as vectors,
  *
- *   sigma_e = 1.4826 median(|g - median(g)|),   sigma = sqrt(2) sigma_e.
+ *   sigma_e = 1.4826 median(g),   sigma = sqrt(2) sigma_e.
  *
- * sigma_e separates the gradients that belong to the bulk (noise, texture) from
- * the outliers (edges); with this sigma the flux g beta(g) has its maximum at
- * sigma_e and falls beyond. Only regions that vary count: values at most 1 % of
- * the 99.9 % quantile of the positive gradients do not, nor do negative ones
- * (walls).
+ * sigma_e separates the gradients of the bulk (noise, texture) from the outliers
+ * (edges): with this sigma the flux g beta(g) has its maximum at sigma_e and falls
+ * beyond. At the median gradient beta is 0.8. Only regions that vary count:
+ * values at most 1 % of the 99.9 % quantile of the positive gradients do not, nor
+ * do negative ones (walls).
  *
  * `point` (a voxel, or a negative first index for none) limits the samples to
- * the voxels within 14 smallest spacings of it along each axis, if at least 64
+ * the voxels within 20 smallest spacings of it along each axis, if at least 64
  * of them vary; else at most about a million voxels of the whole volume are
- * looked at. Where all the gradients are the same, their median takes the place
- * of their deviation; where nothing varies the result is 0. Scales with g.
+ * looked at. Where nothing varies the result is 0. Scales with g.
  */
 double ChooseGradientScale(
   const Grid& grid, const float* gradients, const std::array<int, 3>& point);
