@@ -622,6 +622,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   int stalls = 0;
   double rz = 0.;
   double alpha = 0.;
+  bool restart = false;
   const auto finish = [&](StopReason reason)
   {
     const double last = this->residual<T>(b, phi, nullptr, 1.);
@@ -671,7 +672,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       report.message = "the preconditioned residual is not positive";
       return;
     }
-    const double beta = iteration > 0 && rz > 0. ? -alpha * zAp / rz : 0.;
+    const double beta = restart || iteration == 0 ? 0. : -alpha * zAp / rz;
+    restart = false;
     rz = rzNew;
     ForRows(this->parallelFor, this->rows(), size,
       [&](std::int64_t begin, std::int64_t end)
@@ -724,6 +726,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         report.reason = StopReason::NotFinite;
         return;
       }
+      // Where float's recursion has lost the residual, its directions are lost too.
+      restart = rNorm > 1.5 * recurred;
       // Double itself is at its end when the recomputed norm no longer follows.
       stalls = rNorm > 0.5 * best && recurred < 0.5 * rNorm ? stalls + 1 : 0;
       best = std::min(best, rNorm);
@@ -817,7 +821,8 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
 
 //------------------------------------------------------------------------------
 template <class T>
-bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, DiffusionReport& report) const
+bool DiffusionSolver::steadyStateExists(
+  const T* q, bool& singular, std::vector<std::uint8_t>& seen, DiffusionReport& report) const
 {
   singular = false;
   if (this->everySink || (this->anySink && !this->anyWall))
@@ -854,7 +859,7 @@ bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, DiffusionRep
   // Walls may close a part off: flood each part through its open faces.
   const std::array<int, 3>& n = this->box.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
-  std::vector<std::uint8_t> seen(static_cast<std::size_t>(size), 0);
+  seen.assign(static_cast<std::size_t>(size), 0);
   std::vector<std::int64_t> front;
   for (std::int64_t seed = 0; seed < size; ++seed)
   {
@@ -917,9 +922,18 @@ DiffusionReport DiffusionSolver::solveSteady(
   const double began = now();
   this->setShift(0.);
   bool singular = false;
-  if (this->steadyStateExists(q, singular, report))
+  std::vector<std::uint8_t> reached;
+  if (this->steadyStateExists(q, singular, reached, report))
   {
     const std::int64_t size = this->box.size();
+    const auto darken = [&]
+    {
+      for (std::size_t i = 0; i < reached.size(); ++i)
+      {
+        phi[i] = reached[i] ? phi[i] : 0.;
+      }
+    };
+    darken(); // a start from elsewhere
     RightHandSide<T> b{ q, 1. / this->scale, nullptr, 0., 0. };
     if (singular)
     {
@@ -931,6 +945,7 @@ DiffusionReport DiffusionSolver::solveSteady(
       b.mean = b.qScale * sum / static_cast<double>(size);
     }
     this->conjugateGradients(b, phi, control, 0., 1., report);
+    darken(); // a closed part without sink may hold any constant: it holds none
     if (singular)
     {
       double sum = 0.;

@@ -181,9 +181,14 @@ private:
   double norm(const RightHandSide<T>& b) const;
   template <class T>
   void balance(const T* q, const double* phi, DiffusionReport& report) const;
-  /** False, with a message, where light has nowhere to go; singular: where only -q balances q. */
+  /**
+   * False, with a message, where light has nowhere to go. singular: no voxel has a sink, and
+   * phi is fixed up to a constant. reached: where walls may close parts off, a flag per voxel
+   * for those that light reaches; else empty.
+   */
   template <class T>
-  bool steadyStateExists(const T* q, bool& singular, DiffusionReport& report) const;
+  bool steadyStateExists(
+    const T* q, bool& singular, std::vector<std::uint8_t>& reached, DiffusionReport& report) const;
   /** Adds a constant to all sinks (1 / (c dt) of an implicit step); 0 takes it away. */
   void setShift(double shift);
   void prepareMultigrid();

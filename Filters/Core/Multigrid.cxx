@@ -154,6 +154,106 @@ double applyRow(int n, const RowFaces& f, const RowView& v, float* LIGHTTRANSPOR
   return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
 }
 
+/** Resistance of half a face; a closed one is as good as infinite. */
+inline float halfResistance(float g)
+{
+  return 0.5f / (g > 1e-30f ? g : 1e-30f);
+}
+
+/**
+ * The lines through the faces f = first, first + step, ... of a row, from coarse
+ * centre to coarse centre: half the inner face on either side (`below`, `above`) in
+ * series with the face between; above is null where the voxel there is its own
+ * centre. Writes the weight of the other parent for both voxels at the face,
+ * and the line's conductance (0 elsewhere) where that is asked for.
+ */
+LIGHTTRANSPORT_SIMD
+void lineRow(int n, int first, int step, int end, const float* between, const float* below,
+  const float* above, std::uint8_t* w, std::uint8_t* wNext, float* conductance)
+{
+  if (conductance && step > 1)
+  {
+    for (int i = 0; i < n; ++i)
+    {
+      conductance[i] = 0.f;
+    }
+  }
+  for (int i = first; i < end; i += step)
+  {
+    const float g = between[i];
+    const float here = halfResistance(below[i]);
+    // along x (step 2) the last voxel of an odd row is its own centre
+    const float there = above && (step == 1 || i + 2 < n) ? halfResistance(above[i]) : 0.f;
+    const float whole = here + 1.f / (g > 1e-30f ? g : 1e-30f) + there;
+    const float open = g > 1e-30f ? 255.f / whole : 0.f;
+    if (conductance)
+    {
+      conductance[i] = whole < 1e25f ? open * (1.f / 255.f) : 0.f;
+    }
+    w[i] = static_cast<std::uint8_t>(here * open + 0.5f);
+    wNext[i] = static_cast<std::uint8_t>(there * open + 0.5f);
+  }
+}
+
+/** (factor + slope (here + there)) is a voxel's or a line's weight for a coarse row. */
+struct Weights
+{
+  const std::uint8_t *here, *there;
+  float factor, slope;
+};
+
+/** own += v fy fz (1 - wx), next += v fy fz wx */
+LIGHTTRANSPORT_SIMD
+void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const Weights& x, const Weights& y,
+  const Weights& z, float* LIGHTTRANSPORT_RESTRICT own, float* LIGHTTRANSPORT_RESTRICT next)
+{
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT x0 = x.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT x1 = x.there;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT y0 = y.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT y1 = y.there;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT z0 = z.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT z1 = z.there;
+  const float cy = y.factor, sy = y.slope, cz = z.factor, sz = z.slope;
+  for (int i = 0; i < n; ++i)
+  {
+    const float t = v[i] * (cy + sy * static_cast<float>(y0[i] + y1[i])) *
+      (cz + sz * static_cast<float>(z0[i] + z1[i]));
+    const float u = t * (static_cast<float>(x0[i] + x1[i]) * (0.5f / 255.f));
+    own[i] += t - u;
+    next[i] += u;
+  }
+}
+
+/** x += the tensor product of the three weights on eight coarse values. */
+LIGHTTRANSPORT_SIMD
+void prolongRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx,
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz,
+  const float* const* up, const float* const* side, float* LIGHTTRANSPORT_RESTRICT x)
+{
+  const float* LIGHTTRANSPORT_RESTRICT u0 = up[0];
+  const float* LIGHTTRANSPORT_RESTRICT u1 = up[1];
+  const float* LIGHTTRANSPORT_RESTRICT u2 = up[2];
+  const float* LIGHTTRANSPORT_RESTRICT u3 = up[3];
+  const float* LIGHTTRANSPORT_RESTRICT s0 = side[0];
+  const float* LIGHTTRANSPORT_RESTRICT s1 = side[1];
+  const float* LIGHTTRANSPORT_RESTRICT s2 = side[2];
+  const float* LIGHTTRANSPORT_RESTRICT s3 = side[3];
+  constexpr float unit = 1.f / 255.f;
+  for (int i = 0; i < n; ++i)
+  {
+    const float a = unit * static_cast<float>(wx[i]);
+    const float b = unit * static_cast<float>(wy[i]);
+    const float c = unit * static_cast<float>(wz[i]);
+    const float v0 = u0[i] + a * (s0[i] - u0[i]);
+    const float v1 = u1[i] + a * (s1[i] - u1[i]);
+    const float v2 = u2[i] + a * (s2[i] - u2[i]);
+    const float v3 = u3[i] + a * (s3[i] - u3[i]);
+    const float y0 = v0 + b * (v1 - v0);
+    const float y1 = v2 + b * (v3 - v2);
+    x[i] += y0 + c * (y1 - y0);
+  }
+}
+
 std::int64_t rowsOf(const DiffusionOperator& A)
 {
   return static_cast<std::int64_t>(A.dims[1]) * A.dims[2];
@@ -301,84 +401,220 @@ void Multigrid::coarsen(
       fine.w[d].allocate(A.size());
     }
   }
+  fine.noWeight.allocate(n[0]);
   fine.r.allocate(A.size());
   coarse.A.allocate(nc);
   coarse.x.allocate(coarse.A.size());
   coarse.b.allocate(coarse.A.size());
-
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+
+  // 3. the weights, from the lines through the coarse faces
+  const auto forLines = [&](int d, float* conductance)
+  {
+    ForRows(parallelFor, rowsOf(A), A.size(),
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t row = begin; row < end; ++row)
+        {
+          const int at = d == 1 ? static_cast<int>(row % n[1]) : static_cast<int>(row / n[1]);
+          const std::int64_t o = row * n[0];
+          const float* g = A.g[d].data() + o;
+          if (d == 0)
+          {
+            lineRow(n[0], 1, 2, n[0] - 1, g, g - 1, g + 1, fine.w[0].data() + o,
+              fine.w[0].data() + o + 1, conductance ? conductance + o : nullptr);
+          }
+          else if (at % 2 == 1 && at + 1 < n[d])
+          {
+            // a lone last voxel is its own centre: an inner face that resists nothing
+            const float* there = at + 2 < n[d] ? g + stride[d] : nullptr;
+            lineRow(n[0], 0, 1, n[0], g, g - stride[d], there, fine.w[d].data() + o,
+              fine.w[d].data() + o + stride[d], conductance ? conductance + o : nullptr);
+          }
+          else if (conductance)
+          {
+            std::fill(conductance + o, conductance + o + n[0], 0.f);
+          }
+        }
+      });
+  };
+  for (int d = 0; d < 3; ++d)
+  {
+    if (fine.halved[d])
+    {
+      forLines(d, nullptr);
+    }
+  }
+  // 2. each line's conductance goes to the coarse columns that its voxels are put between
+  for (int d = 0; d < 3; ++d)
+  {
+    const float* lines = A.g[d].data();
+    if (fine.halved[d])
+    {
+      forLines(d, fine.r.data());
+      lines = fine.r.data();
+    }
+    gather(A, fine, coarse.A, lines, d, coarse.A.g[d].data(), parallelFor);
+  }
+  // Sinks stay with the parent: a strong one pulls its own voxel down, not the neighbour's.
   ForRows(parallelFor, rowsOf(coarse.A), A.size(),
     [&](std::int64_t begin, std::int64_t end)
     {
       for (std::int64_t row = begin; row < end; ++row)
       {
-        int C[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-        for (C[0] = 0; C[0] < nc[0]; ++C[0])
+        const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+        int first[3];
+        int last[3];
+        for (int d = 1; d < 3; ++d)
         {
-          int first[3];
-          int last[3];
-          for (int d = 0; d < 3; ++d)
+          first[d] = fine.halved[d] ? 2 * J[d] : J[d];
+          last[d] = fine.halved[d] ? std::min(2 * J[d] + 1, n[d] - 1) : J[d];
+        }
+        float* sink = coarse.A.s.data() + row * nc[0];
+        for (int k = first[2]; k <= last[2]; ++k)
+        {
+          for (int j = first[1]; j <= last[1]; ++j)
           {
-            first[d] = fine.halved[d] ? 2 * C[d] : C[d];
-            last[d] = fine.halved[d] ? std::min(2 * C[d] + 1, n[d] - 1) : C[d];
-          }
-          double sink = 0.;
-          double conductance[3] = { 0., 0., 0. };
-          for (int k = first[2]; k <= last[2]; ++k)
-          {
-            for (int j = first[1]; j <= last[1]; ++j)
+            const float* s = A.s.data() + stride[1] * j + stride[2] * k;
+            for (int i = 0; i < n[0]; ++i)
             {
-              for (int i = first[0]; i <= last[0]; ++i)
-              {
-                const int at[3] = { i, j, k };
-                const std::int64_t f = i + stride[1] * j + stride[2] * k;
-                sink += static_cast<double>(A.s[f]);
-                for (int d = 0; d < 3; ++d)
-                {
-                  // the voxel on this side of the upper coarse face along d, and the line through
-                  // it
-                  if (at[d] != last[d] || at[d] + 1 >= n[d])
-                  {
-                    continue;
-                  }
-                  const double between = static_cast<double>(A.g[d][f]);
-                  if (!fine.halved[d])
-                  {
-                    conductance[d] += between;
-                    continue;
-                  }
-                  if (between <= 0.)
-                  {
-                    continue; // the weights stay 0
-                  }
-                  // half of the inner face on either side; a lone last voxel is its own centre.
-                  // A closed inner face stops the line: its far end is the voxel itself.
-                  const auto half = [](double g) { return g > 0. ? 0.5 / g : 1e30; };
-                  const double here =
-                    last[d] > first[d] ? half(static_cast<double>(A.g[d][f - stride[d]])) : 0.;
-                  const std::int64_t next = f + stride[d];
-                  const bool pair = at[d] + 2 < n[d];
-                  const double there = pair ? half(static_cast<double>(A.g[d][next])) : 0.;
-                  const double face = 1. / between;
-                  const double whole = here + face + there;
-                  conductance[d] += 1. / whole;
-                  fine.w[d][f] = static_cast<std::uint8_t>(std::lround(255. * here / whole));
-                  fine.w[d][next] = static_cast<std::uint8_t>(std::lround(255. * there / whole));
-                }
-              }
+              sink[fine.halved[0] ? i / 2 : i] += s[i];
             }
           }
-          const std::int64_t c = C[0] + nc[0] * (C[1] + static_cast<std::int64_t>(nc[1]) * C[2]);
-          for (int d = 0; d < 3; ++d)
-          {
-            coarse.A.g[d][c] = static_cast<float>(conductance[d]);
-          }
-          coarse.A.s[c] = static_cast<float>(sink);
         }
       }
     });
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
+}
+
+void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
+  const float* v, int along, float* out, const ParallelFor& parallelFor) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const std::array<int, 3>& nc = C.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  ForRows(parallelFor, rowsOf(C), A.size(),
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      Buffer<float> own(n[0] + 2);
+      Buffer<float> next(n[0] + 2);
+      for (std::int64_t row = begin; row < end; ++row)
+      {
+        std::fill(own.data(), own.data() + n[0], 0.f);
+        std::fill(next.data(), next.data() + n[0], 0.f);
+        const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+        int first[3];
+        int last[3];
+        for (int d = 1; d < 3; ++d)
+        {
+          first[d] = !fine.halved[d] ? J[d] : d == along ? 2 * J[d] + 1 : std::max(0, 2 * J[d] - 1);
+          last[d] = !fine.halved[d] ? J[d]
+            : d == along            ? std::min(2 * J[d] + 1, n[d] - 1)
+                                    : std::min(2 * J[d] + 2, n[d] - 1);
+        }
+        for (int k = first[2]; k <= last[2]; ++k)
+        {
+          for (int j = first[1]; j <= last[1]; ++j)
+          {
+            const std::int64_t o = stride[1] * j + stride[2] * k;
+            const int at[3] = { 0, j, k };
+            // a line's weights are the mean of those at its two ends
+            const bool ends = along >= 0 && at[along] + 1 < n[along];
+            const std::int64_t other = ends ? stride[along] : 0;
+            Weights weights[3];
+            for (int d = 0; d < 3; ++d)
+            {
+              if (fine.halved[d] && d != along)
+              {
+                const std::uint8_t* w = fine.w[d].data() + o;
+                const bool parent = d == 0 || at[d] / 2 == J[d];
+                weights[d] = { w, w + other, parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
+              }
+              else
+              {
+                weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 1.f, 0.f };
+              }
+            }
+            gatherRow(n[0], v + o, weights[0], weights[1], weights[2], own.data(), next.data());
+          }
+        }
+        float* c = out + row * nc[0];
+        if (fine.halved[0])
+        {
+          const float* p = own.data();
+          const float* q = next.data();
+          for (int i = 0; i < nc[0]; ++i)
+          {
+            c[i] = p[2 * i] + p[2 * i + 1] + q[2 * i - 1] + q[2 * i + 2];
+          }
+        }
+        else
+        {
+          std::copy(own.data(), own.data() + nc[0], c);
+        }
+      }
+    });
+}
+
+void Multigrid::prolong(const DiffusionOperator& A, const Level& fine, const Level& coarse,
+  float* x, const ParallelFor& parallelFor) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const std::array<int, 3>& nc = coarse.A.dims;
+  ForRows(parallelFor, rowsOf(A), A.size(),
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      Buffer<float> up[4];
+      Buffer<float> side[4];
+      for (int c = 0; c < 4; ++c)
+      {
+        up[c].allocate(n[0] + 1);
+        side[c].allocate(n[0] + 1);
+      }
+      for (std::int64_t row = begin; row < end; ++row)
+      {
+        const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+        const std::int64_t o = row * n[0];
+        // the parent's coordinate, and its neighbour's on this voxel's side
+        int J[3][2];
+        Weights weights[3];
+        for (int d = 0; d < 3; ++d)
+        {
+          const int parent = fine.halved[d] ? at[d] / 2 : at[d];
+          const int neighbour = parent + (at[d] % 2 ? 1 : -1);
+          const bool inside = fine.halved[d] && neighbour >= 0 && neighbour < nc[d];
+          J[d][0] = parent;
+          J[d][1] = inside ? neighbour : parent;
+          const std::uint8_t* w = fine.halved[d] ? fine.w[d].data() + o : fine.noWeight.data();
+          weights[d] = { w, w, 1.f, -0.5f / 255.f };
+        }
+        for (int c = 0; c < 4; ++c)
+        {
+          const float* xc = coarse.x.data() +
+            nc[0] * (J[1][c & 1] + static_cast<std::int64_t>(nc[1]) * J[2][c >> 1]);
+          float* u = up[c].data();
+          float* s = side[c].data();
+          if (fine.halved[0])
+          {
+            for (int i = 0; i < nc[0]; ++i)
+            {
+              u[2 * i] = u[2 * i + 1] = xc[i];
+              s[2 * i] = xc[i - 1];
+              s[2 * i + 1] = xc[i + 1];
+            }
+          }
+          else
+          {
+            std::copy(xc, xc + n[0], u);
+          }
+        }
+        const float* const u[4] = { up[0].data(), up[1].data(), up[2].data(), up[3].data() };
+        const float* const s[4] = { side[0].data(), side[1].data(), side[2].data(),
+          side[3].data() };
+        prolongRow(n[0], weights[0].here, weights[1].here, weights[2].here, u, s, x + o);
+      }
+    });
 }
 
 void CloseIsolated(DiffusionOperator& A, float isolated, const ParallelFor& parallelFor)
@@ -425,111 +661,19 @@ void Multigrid::cycle(std::size_t l, const DiffusionOperator& A, const float* b,
   if (!coarsest)
   {
     Level& coarse = this->levels[l + 1];
-    const std::array<int, 3>& n = A.dims;
-    const std::array<int, 3>& nc = coarse.A.dims;
-    const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
     float* r = fine.r.data();
+    const int nx = A.dims[0];
     ForRows(parallelFor, rowsOf(A), A.size(),
       [&](std::int64_t begin, std::int64_t end)
       {
         for (std::int64_t row = begin; row < end; ++row)
         {
-          residualRow(n[0], facesOfRow(A, row), viewRow(A, x, row), b + row * n[0], r + row * n[0]);
+          residualRow(nx, facesOfRow(A, row), viewRow(A, x, row), b + row * nx, r + row * nx);
         }
       });
-    // 3. restriction, the transpose of the prolongation
-    const bool* halved = fine.halved.data();
-    constexpr float unit = 1.f / 255.f;
-    const std::uint8_t* w[3] = { fine.w[0].data(), fine.w[1].data(), fine.w[2].data() };
-    const auto own = [&](std::int64_t f)
-    {
-      float sum = 0.f;
-      for (int d = 0; d < 3; ++d)
-      {
-        sum += halved[d] ? unit * static_cast<float>(w[d][f]) : 0.f;
-      }
-      return 1.f - sum;
-    };
-    ForRows(parallelFor, rowsOf(coarse.A), A.size(),
-      [&](std::int64_t begin, std::int64_t end)
-      {
-        for (std::int64_t row = begin; row < end; ++row)
-        {
-          int C[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-          for (C[0] = 0; C[0] < nc[0]; ++C[0])
-          {
-            int first[3];
-            int last[3];
-            for (int d = 0; d < 3; ++d)
-            {
-              first[d] = halved[d] ? 2 * C[d] : C[d];
-              last[d] = halved[d] ? std::min(2 * C[d] + 1, n[d] - 1) : C[d];
-            }
-            float sum = 0.f;
-            for (int k = first[2]; k <= last[2]; ++k)
-            {
-              for (int j = first[1]; j <= last[1]; ++j)
-              {
-                for (int i = first[0]; i <= last[0]; ++i)
-                {
-                  const std::int64_t f = i + stride[1] * j + stride[2] * k;
-                  sum += own(f) * r[f];
-                  const int at[3] = { i, j, k };
-                  for (int d = 0; d < 3; ++d)
-                  {
-                    if (!halved[d])
-                    {
-                      continue;
-                    }
-                    if (at[d] == first[d] && at[d] > 0)
-                    {
-                      const std::int64_t q = f - stride[d];
-                      sum += unit * static_cast<float>(w[d][q]) * r[q];
-                    }
-                    if (at[d] == last[d] && at[d] + 1 < n[d])
-                    {
-                      const std::int64_t q = f + stride[d];
-                      sum += unit * static_cast<float>(w[d][q]) * r[q];
-                    }
-                  }
-                }
-              }
-            }
-            coarse.b[C[0] + row * nc[0]] = sum;
-          }
-        }
-      });
+    this->gather(A, fine, coarse.A, r, -1, coarse.b.data(), parallelFor);
     this->cycle(l + 1, coarse.A, coarse.b.data(), coarse.x.data(), parallelFor);
-    // 3. prolongation
-    const std::int64_t strideC[3] = { 1, nc[0], static_cast<std::int64_t>(nc[0]) * nc[1] };
-    const float* xc = coarse.x.data();
-    ForRows(parallelFor, rowsOf(A), A.size(),
-      [&](std::int64_t begin, std::int64_t end)
-      {
-        for (std::int64_t row = begin; row < end; ++row)
-        {
-          int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-          for (at[0] = 0; at[0] < n[0]; ++at[0])
-          {
-            const std::int64_t f = at[0] + row * n[0];
-            std::int64_t c = 0;
-            for (int d = 0; d < 3; ++d)
-            {
-              c += strideC[d] * (halved[d] ? at[d] / 2 : at[d]);
-            }
-            float value = xc[c];
-            for (int d = 0; d < 3; ++d)
-            {
-              if (halved[d] && w[d][f] != 0)
-              {
-                const std::int64_t q = (at[d] & 1) ? c + strideC[d] : c - strideC[d];
-                value += unit * static_cast<float>(w[d][f]) * (xc[q] - xc[c]);
-              }
-            }
-            x[f] += value;
-          }
-        }
-      });
+    this->prolong(A, fine, coarse, x, parallelFor);
   }
   // 4. smooth: black then red
   for (int sweep = 0; sweep < this->sweeps; ++sweep)

@@ -91,11 +91,22 @@ private:
     Buffer<float> r;     // residual, where there is a coarser level
     std::array<bool, 3> halved{ { false, false, false } };
     std::array<Buffer<std::uint8_t>, 3> w; // weight of the parent's neighbour, /255
+    Buffer<std::uint8_t> noWeight;         // a row of 0, along axes that are not halved
   };
   void cycle(std::size_t l, const DiffusionOperator& A, const float* b, float* x,
     const ParallelFor& parallelFor);
   void coarsen(
     const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const;
+
+  /**
+   * out_C = sum over voxels f of P_fC v_f. `along` >= 0: v stands on the faces
+   * along that axis, and a line counts for the coarse face that it crosses.
+   */
+  void gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
+    const float* v, int along, float* out, const ParallelFor& parallelFor) const;
+  /** x += P coarse.x */
+  void prolong(const DiffusionOperator& A, const Level& fine, const Level& coarse, float* x,
+    const ParallelFor& parallelFor) const;
 
   const DiffusionOperator* finest = nullptr;
   std::deque<Level> levels;
