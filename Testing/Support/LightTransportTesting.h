@@ -60,6 +60,33 @@ public:
 #endif
   }
 
+  /** Where it is VTK itself that computes with what is bad on purpose. */
+  class WithoutTraps
+  {
+  public:
+#if defined(__GLIBC__)
+    WithoutTraps()
+      : before(fedisableexcept(FE_ALL_EXCEPT))
+    {
+    }
+    ~WithoutTraps()
+    {
+      feclearexcept(FE_ALL_EXCEPT);
+      feenableexcept(this->before);
+    }
+#else
+    WithoutTraps() = default;
+    ~WithoutTraps() {}
+#endif
+    WithoutTraps(const WithoutTraps&) = delete;
+    WithoutTraps& operator=(const WithoutTraps&) = delete;
+
+  private:
+#if defined(__GLIBC__)
+    int before;
+#endif
+  };
+
   /** True where the optional file of the shared data exists; else say so. */
   bool hasData(const std::string& name) const
   {
