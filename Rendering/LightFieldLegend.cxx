@@ -96,11 +96,6 @@ void BarColor(const LightLook& look, double t, bool isNegative, int column, doub
     }
     return;
   }
-  if (look.mode == vtkLightFieldProperty::Illuminate)
-  {
-    std::fill_n(rgb, 3, 1. + look.strength * (t - 1.));
-    return;
-  }
   std::copy_n(look.At(t, isNegative), 3, rgb);
 }
 } // namespace
@@ -170,9 +165,8 @@ Legend MakeLegend(vtkPolyData* bars, const LightLook& look, bool hasPositive, bo
   Legend legend;
   Drawing drawing;
   const bool isFlux = look.mode == vtkLightFieldProperty::FluxDirection;
-  const bool isSigned = hasPositive && hasNegative && look.mode == vtkLightFieldProperty::Overlay;
-  const bool onlyNegative =
-    hasNegative && !hasPositive && look.mode == vtkLightFieldProperty::Overlay;
+  const bool isSigned = hasPositive && hasNegative && !isFlux;
+  const bool onlyNegative = hasNegative && !hasPositive && !isFlux;
   const int columns = isFlux ? 3 : 1;
 
   const double x0 = 0.6 * fontSize;

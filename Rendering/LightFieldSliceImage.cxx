@@ -118,21 +118,12 @@ private:
   std::vector<double> Values;
 };
 
-/** Lays the light over a colour, as the volume mapper does with a sample. */
+/** Lays the light over a colour, as the volume mapper's Overlay does with a sample. */
 void AddLight(const LightLook& look, const Vector3& world, double rgb[3])
 {
   double value[3] = { 0., 0., 0. };
   const bool isFlux = look.mode == vtkLightFieldProperty::FluxDirection;
   const bool has = look.hasWindow && look.field && look.field.Sample(world, isFlux ? 3 : 1, value);
-  if (look.mode == vtkLightFieldProperty::Illuminate)
-  {
-    const double t = has && value[0] > 0. ? look.property->GetPosition(value[0], look.window) : 0.;
-    for (int c = 0; c < 3; ++c)
-    {
-      rgb[c] *= 1. + look.strength * (t - 1.);
-    }
-    return;
-  }
   if (!has)
   {
     return;
@@ -228,7 +219,6 @@ void LightLook::Tabulate(double maximum)
 {
   this->hasWindow = this->property->GetEffectiveWindow(maximum, this->window);
   this->mode = this->property->GetMode();
-  this->strength = this->property->GetStrength();
   this->positive.assign(4 * TableSize, 0.);
   this->negative.assign(4 * TableSize, 0.);
   if (!this->hasWindow)

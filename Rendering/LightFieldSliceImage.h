@@ -64,7 +64,6 @@ struct LightLook
   vtkLightFieldProperty* property = nullptr;
   std::vector<double> positive; // RGBA, 4 per entry
   std::vector<double> negative;
-  double strength = 1.;
 
   /** Fills the tables for a field whose largest magnitude is maximum. */
   void Tabulate(double maximum);

@@ -183,16 +183,16 @@ struct FieldExtremes
 {
   double largestMagnitude = 0.;
   vtkIdType strongest = -1; // of the largest positive value, else of the largest magnitude
-  bool hasPositive = false;
-  bool hasNegative = false;
+  double largest = 0.;      // of the positive values
+  double smallest = 0.;     // of the negative ones
 };
 
 FieldExtremes FindExtremes(vtkDataArray* array, int components)
 {
   FieldExtremes extremes;
-  double largest = 0.;
+  double& largest = extremes.largest;
+  double& smallest = extremes.smallest;
   vtkIdType mostNegative = -1;
-  double smallest = 0.;
   const vtkIdType count = array->GetNumberOfTuples();
   for (vtkIdType id = 0; id < count; ++id)
   {
@@ -217,8 +217,6 @@ FieldExtremes FindExtremes(vtkDataArray* array, int components)
       mostNegative = id;
     }
   }
-  extremes.hasPositive = largest > 0.;
-  extremes.hasNegative = smallest < 0.;
   extremes.largestMagnitude = std::max(largest, -smallest);
   if (extremes.strongest < 0)
   {
@@ -285,6 +283,7 @@ public:
     vtkNew<vtkTextActor> marks[4]; // left, right, bottom, top
     vtkNew<vtkTextActor> caption;
     Box box;
+    double middle[2] = { 0.5, 0.5 }; // (s, t) in the middle of the box
   };
 
   vtkInternals()
@@ -296,6 +295,7 @@ public:
       panel.texture->SetInputData(panel.picture);
       panel.texture->InterpolateOn();
       panel.texture->MipmapOn();
+      panel.texture->RepeatOff(); // else the opposite edge shines through
       panel.texture->EdgeClampOn();
       panel.texture->SetColorModeToDirectScalars();
       panel.actor->SetMapper(panel.mapper);
@@ -343,6 +343,13 @@ public:
   bool Build(vtkLightFieldSlices* self, vtkImageData* anatomy, vtkImageData* light);
   void BuildScene(vtkLightFieldSlices* self, Panel& panel);
   void MakeArrows(double cell);
+
+  /** Whether the field's extreme shows: a solver's undershoot is far below the window. */
+  bool IsVisible(double extreme) const
+  {
+    const double t = this->Property->GetPosition(extreme, this->Look.window);
+    return this->Look.At(t, extreme < 0.)[3] > 0.02;
+  }
   void Arrange(vtkLightFieldSlices* self, vtkRenderWindow* window);
   void ArrangePanel(vtkLightFieldSlices* self, Panel& panel, const Box& box, int fontSize);
   void ArrangeLegend(vtkLightFieldSlices* self, const Box& box, int fontSize);
@@ -538,11 +545,7 @@ bool vtkLightFieldSlices::vtkInternals::Build(
     }
   }
   this->Look.Tabulate(this->ShownExtremes.largestMagnitude);
-  if (!this->Look.field)
-  {
-    this->Look.hasWindow = false;
-    this->Look.mode = vtkLightFieldProperty::Overlay; // nothing to dim the anatomy with
-  }
+  this->Look.hasWindow = this->Look.hasWindow && this->Look.field;
 
   // Stage 2: the position.
   double voxel[3];
@@ -618,7 +621,7 @@ bool vtkLightFieldSlices::vtkInternals::Build(
     this->Arrows.uniform = self->ArrowLength == UniformLength;
   }
   this->LongestSide = longest;
-  this->MakeArrows(longest / self->NumberOfArrowsAlong);
+  this->MakeArrows(longest / self->NumberOfArrowsAlong / self->Zoom);
   return true;
 }
 
@@ -696,7 +699,10 @@ void vtkLightFieldSlices::vtkInternals::BuildScene(vtkLightFieldSlices* self, Pa
   }
   panel.crosshair.actor->SetVisibility(self->ShowCrosshair);
 
-  const Vector3 center = frame.At(0.5, 0.5);
+  // Zoomed in, the point is in the middle; else the slice.
+  panel.middle[0] = self->Zoom > 1. ? s : 0.5;
+  panel.middle[1] = self->Zoom > 1. ? t : 0.5;
+  const Vector3 center = frame.At(panel.middle[0], panel.middle[1]);
   vtkCamera* camera = panel.renderer->GetActiveCamera();
   camera->SetFocalPoint(center[0], center[1], center[2]);
   camera->SetPosition(center[0] + diagonal * frame.toViewer[0],
@@ -717,7 +723,8 @@ void vtkLightFieldSlices::vtkInternals::Arrange(vtkLightFieldSlices* self, vtkRe
   const int fontSize = std::min(18,
     std::max(9, static_cast<int>(std::lround(std::sqrt(1. * needs.width * needs.height) / 30.))));
   needs.least = std::min(3 * fontSize, std::max(1, needs.width / 6));
-  const bool legend = self->ShowLegend && this->Look.hasWindow;
+  const bool legend = self->ShowLegend && this->Look.hasWindow &&
+    (this->IsVisible(this->ShownExtremes.largest) || this->IsVisible(this->ShownExtremes.smallest));
   const bool isFlux = this->Look.mode == vtkLightFieldProperty::FluxDirection;
   needs.legend =
     legend ? std::min(lighttransport::LegendWidth(fontSize, isFlux), needs.width / 3) : 0;
@@ -729,10 +736,10 @@ void vtkLightFieldSlices::vtkInternals::Arrange(vtkLightFieldSlices* self, vtkRe
   const LayoutPlan grid = PlanGrid(needs);
   const LayoutPlan& plan =
     self->Layout == Row || (self->Layout != Grid && row.scale >= grid.scale) ? row : grid;
-  this->Scale = plan.scale;
+  this->Scale = plan.scale * self->Zoom;
   if (this->Arrows.flux)
   {
-    const double wanted = this->LongestSide / self->NumberOfArrowsAlong;
+    const double wanted = this->LongestSide / self->NumberOfArrowsAlong / self->Zoom;
     const double cell = std::max(wanted, LeastArrowPixels / this->Scale);
     if (cell != this->Arrows.cell)
     {
@@ -850,8 +857,8 @@ void vtkLightFieldSlices::vtkInternals::ArrangeLegend(
   }
   const std::string title = (isFlux ? "flux (" : "fluence (") + self->FluenceUnits + ")";
   const lighttransport::Legend legend =
-    lighttransport::MakeLegend(this->Bars, this->Look, this->ShownExtremes.hasPositive,
-      this->ShownExtremes.hasNegative, title, names, box.width, box.height, fontSize);
+    lighttransport::MakeLegend(this->Bars, this->Look, this->IsVisible(this->ShownExtremes.largest),
+      this->IsVisible(this->ShownExtremes.smallest), title, names, box.width, box.height, fontSize);
   for (const lighttransport::LegendLabel& label : legend.labels)
   {
     vtkNew<vtkTextActor> text;
@@ -1014,6 +1021,21 @@ void vtkLightFieldSlices::ClearPosition()
 }
 
 //------------------------------------------------------------------------------
+void vtkLightFieldSlices::SetZoom(double zoom)
+{
+  if (!(zoom >= 1.) || !std::isfinite(zoom))
+  {
+    vtkErrorMacro("Zoom is " << zoom << "; expected: a finite number of at least 1.");
+    return;
+  }
+  if (this->Zoom != zoom)
+  {
+    this->Zoom = zoom;
+    this->Modified();
+  }
+}
+
+//------------------------------------------------------------------------------
 void vtkLightFieldSlices::SetWindowLevel(double window, double level)
 {
   if (!std::isfinite(window) || !std::isfinite(level))
@@ -1139,11 +1161,11 @@ bool vtkLightFieldSlices::DisplayToWorld(double x, double y, double world[3])
   for (const auto& panel : this->Internals->Panels)
   {
     const SliceFrame& frame = panel.frame;
-    // From the middle of the box, which is the middle of the slice.
+    // From the middle of the box.
     const double dx = x + 0.5 - panel.box.x - 0.5 * panel.box.width;
     const double dy = y + 0.5 - panel.box.y - 0.5 * panel.box.height;
-    const double s = 0.5 + dx / (this->Internals->Scale * frame.length[0]);
-    const double t = 0.5 + dy / (this->Internals->Scale * frame.length[1]);
+    const double s = panel.middle[0] + dx / (this->Internals->Scale * frame.length[0]);
+    const double t = panel.middle[1] + dy / (this->Internals->Scale * frame.length[1]);
     if (std::abs(dx) <= 0.5 * panel.box.width && std::abs(dy) <= 0.5 * panel.box.height &&
       s >= 0. && s <= 1. && t >= 0. && t <= 1.)
     {
@@ -1175,6 +1197,7 @@ void vtkLightFieldSlices::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ShowLegend: " << this->ShowLegend << "\n";
   os << indent << "FluenceUnits: " << this->FluenceUnits << "\n";
   os << indent << "LengthUnits: " << this->LengthUnits << "\n";
+  os << indent << "Zoom: " << this->Zoom << "\n";
   os << indent << "Layout: " << this->Layout << "\n";
   os << indent << "NumberOfBuilds: " << this->NumberOfBuilds << "\n";
 }

@@ -33,7 +33,9 @@
  * 3. Colours. The anatomy is linear between neighbours in the plane, grey
  *    between two percentiles of the data unless a window is set; NaN is black.
  *    8-bit images of three or four components are shown as colours. The light
- *    is trilinear in its own grid; NaN there is no light.
+ *    is trilinear in its own grid; NaN there is no light. The property's Overlay
+ *    and FluxDirection are as in the volume; in its Illuminate, which darkens
+ *    what is unlit, slices show the Overlay, as anatomy is what they are for.
  * 4. Layout. All slices have one scale (world length per pixel), whatever the
  *    spacing of the axes, as large as the rectangle allows.
  *
@@ -200,7 +202,8 @@ public:
   ///@}
 
   ///@{
-  /** How many arrows fit side by side along the longest side; 20 by default, 1..200. */
+  /** How many arrows fit side by side along the longest side (of what is seen, if
+   * zoomed); 20 by default, 1..200. */
   vtkSetClampMacro(NumberOfArrowsAlong, int, 1, 200);
   vtkGetMacro(NumberOfArrowsAlong, int);
   ///@}
@@ -246,6 +249,15 @@ public:
    */
   vtkSetMacro(Layout, int);
   vtkGetMacro(Layout, int);
+  ///@}
+
+  ///@{
+  /**
+   * Magnification, 1 (default: the slices fit) or more: then Position is in the
+   * middle of each slice's part of the window, and what is outside is cut off.
+   */
+  void SetZoom(double zoom);
+  vtkGetMacro(Zoom, double);
   ///@}
 
   /**
@@ -312,6 +324,7 @@ protected:
   std::string FluenceUnits = "power/length\xc2\xb2";
   std::string LengthUnits;
   int Layout = Automatic;
+  double Zoom = 1.;
   int NumberOfBuilds = 0;
 
 private:
