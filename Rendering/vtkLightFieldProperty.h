@@ -32,7 +32,7 @@
  *   the light itself is a glowing medium of that colour which hides the
  *   fraction o of what is behind it per LightOpacityUnitDistance. So a lit
  *   cavity shows although the transfer function makes it transparent.
- * - Illuminate: the tissue's colour is multiplied by 0.3 + 2.7 t (to 1 as
+ * - Illuminate: the tissue's colour is multiplied by 0.5 + 3.5 t (to 1 as
  *   Strength goes to 0), at most to white. Unlit tissue becomes dark; a negative
  *   fluence is no light.
  * - FluxDirection: as Overlay, with the flux E in place of phi: t from |E|, the

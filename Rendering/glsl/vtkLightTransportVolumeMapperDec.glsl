@@ -86,7 +86,7 @@ vec4 ltLight(ltFieldValue field)
 vec3 ltIlluminate(vec4 tissue, float phi, out float lit)
 {
   lit = phi > 0.0 ? ltPosition(phi) : 0.0;
-  float factor = mix(1.0, 0.3 + 2.7 * lit, in_ltStrength);
+  float factor = mix(1.0, 0.5 + 3.5 * lit, in_ltStrength);
   return min(factor * tissue.rgb, max(tissue.rgb, vec3(tissue.a)));
 }
 #endif
