@@ -763,6 +763,17 @@ int* vtkLightTransportEGLRenderWindow::GetScreenSize()
 }
 
 //------------------------------------------------------------------------------
+int vtkLightTransportEGLRenderWindow::GetColorBufferSizes(int* rgba)
+{
+  if (!rgba || !this->Initialized)
+  {
+    return 0;
+  }
+  std::fill(rgba, rgba + 4, 8);
+  return 32;
+}
+
+//------------------------------------------------------------------------------
 void vtkLightTransportEGLRenderWindow::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);

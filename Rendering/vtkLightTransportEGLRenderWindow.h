@@ -141,6 +141,8 @@ public:
   int SupportsOpenGL() override;
   void* GetGenericContext() override;
   int* GetScreenSize() VTK_SIZEHINT(2) override;
+  /** Of the buffers that are rendered to; there is no other. vtkHardwareSelector asks. */
+  int GetColorBufferSizes(int* rgba) override;
   void WaitForCompletion() override;
 
 protected:

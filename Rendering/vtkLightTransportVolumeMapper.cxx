@@ -812,6 +812,15 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
     volume->SetPropertyKeys(made);
     keys = made;
   }
+  // The superclass takes the number of its draw buffers from the last pass.
+  unsigned int buffers = 1;
+  if (const int passes = keys->Length(vtkOpenGLRenderPass::RenderPasses()))
+  {
+    auto* last =
+      vtkOpenGLRenderPass::SafeDownCast(vtkOpenGLRenderPass::RenderPasses()->Get(keys, passes - 1));
+    buffers = last ? last->GetActiveDrawBuffers() : buffers;
+  }
+  self.Pass->SetActiveDrawBuffers(buffers);
   keys->Append(vtkOpenGLRenderPass::RenderPasses(), self.Pass);
   this->Superclass::GPURender(renderer, volume);
   keys->Remove(vtkOpenGLRenderPass::RenderPasses(), self.Pass);
