@@ -32,6 +32,14 @@ namespace lighttransport
 {
 namespace testing
 {
+/** For bad input: comparing a NaN raises a floating-point exception, and is meant to. */
+inline void allowFloatingPointExceptions()
+{
+#if defined(__GLIBC__)
+  fedisableexcept(FE_ALL_EXCEPT);
+#endif
+}
+
 /** Keeps the errors and warnings of the objects that it observes. */
 class MessageLog : public vtkCommand
 {
