@@ -167,6 +167,41 @@ std::array<int, 3> SamplesOf(const ImageSource& image)
   }
   return samples;
 }
+/**
+ * Where to cut the part of a segment, from + t along, into pieces: at the voxels'
+ * faces where it is a voxel wide, so that each voxel takes its exact length, else
+ * evenly.
+ */
+std::vector<double> CutsOf(const Grid& grid, const std::array<double, 3>& from,
+  const std::array<double, 3>& along, const std::array<double, 2>& part, double length,
+  double radius0, double radius1)
+{
+  std::vector<double> cuts{ part[0], part[1] };
+  if (std::max(radius0, radius1) < 0.5 * grid.smallestSpacing())
+  {
+    for (int a = 0; a < 3; ++a)
+    {
+      const double begin = from[a] + part[0] * along[a];
+      const double end = from[a] + part[1] * along[a];
+      const double first = std::ceil(std::min(begin, end) - 0.5) + 0.5;
+      for (int n = 0; n < grid.dims[a] + 3 && first + n < std::max(begin, end); ++n)
+      {
+        cuts.push_back((first + n - from[a]) / along[a]);
+      }
+    }
+    std::sort(cuts.begin(), cuts.end());
+    return cuts;
+  }
+  const double step = std::max(0.5 * grid.smallestSpacing(), 0.25 * std::min(radius0, radius1));
+  const double pieces = std::max(1., std::ceil(length * (part[1] - part[0]) / step));
+  cuts.clear();
+  for (double c = 0.; c < pieces; c += 1.)
+  {
+    cuts.push_back(part[0] + (part[1] - part[0]) * c / pieces);
+  }
+  cuts.push_back(part[1]);
+  return cuts;
+}
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -208,14 +243,12 @@ bool StrokeToSpheres(const Grid& grid, const Stroke& stroke, std::vector<SphereS
     const auto& from = stroke.points[p];
     const auto& to = stroke.points[p + 1];
     std::array<double, 3> along;
-    double segment2 = 0.;
     const double widest = std::max(stroke.radius[p], stroke.radius[p + 1]);
     double t0 = 0.; // the part of the segment that may meet the domain
     double t1 = 1.;
     for (int a = 0; a < 3; ++a)
     {
       along[a] = to[a] - from[a];
-      segment2 += along[a] * grid.spacing[a] * along[a] * grid.spacing[a];
       const double low = -1. - widest / grid.spacing[a];
       const double high = grid.dims[a] + widest / grid.spacing[a];
       if (std::abs(along[a]) > 1e-9 * (high - low))
@@ -226,19 +259,18 @@ bool StrokeToSpheres(const Grid& grid, const Stroke& stroke, std::vector<SphereS
         t1 = std::min(t1, std::max(ta, tb));
       }
     }
-    const double segment = std::sqrt(segment2);
+    const double segment = std::hypot(
+      along[0] * grid.spacing[0], along[1] * grid.spacing[1], along[2] * grid.spacing[2]);
     length += segment;
     if (!(segment > 0.) || t0 >= t1)
     {
       continue;
     }
-    const double step = std::max(
-      0.5 * grid.smallestSpacing(), 0.25 * std::min(stroke.radius[p], stroke.radius[p + 1]));
-    const std::int64_t pieces =
-      std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(segment * (t1 - t0) / step)));
-    for (std::int64_t piece = 0; piece < pieces; ++piece)
+    const std::vector<double> cuts =
+      CutsOf(grid, from, along, { { t0, t1 } }, segment, stroke.radius[p], stroke.radius[p + 1]);
+    for (std::size_t c = 0; c + 1 < cuts.size(); ++c)
     {
-      const double t = t0 + (t1 - t0) * (piece + 0.5) / static_cast<double>(pieces);
+      const double t = 0.5 * (cuts[c] + cuts[c + 1]);
       SphereSource sphere;
       for (int a = 0; a < 3; ++a)
       {
@@ -249,7 +281,7 @@ bool StrokeToSpheres(const Grid& grid, const Stroke& stroke, std::vector<SphereS
       if (MeetsDomain(grid, sphere))
       {
         spheres.push_back(sphere);
-        lengths.push_back(segment * (t1 - t0) / static_cast<double>(pieces));
+        lengths.push_back(segment * (cuts[c + 1] - cuts[c]));
         counted += lengths.back();
       }
     }

@@ -47,11 +47,13 @@ struct Stroke
 };
 
 /**
- * Appends the stroke as spheres along it, at most half the smallest spacing (or a
- * quarter of the radius) apart. Only those that meet the domain count; the power
- * per length is that of the points, interpolated, over the length that counts:
- * equal powers P make P in all. A stroke of no length is one sphere with its mean
- * power. False, and nothing is added, if no part of it meets the domain.
+ * Appends the stroke as spheres along it: one for each voxel that it crosses, with
+ * its exact length, where the radius is below half the smallest spacing, else at
+ * most half the smallest spacing (or a quarter of the radius) apart. Only those
+ * that meet the domain count; the power per length is that of the points,
+ * interpolated, over the length that counts: equal powers P make P in all. A
+ * stroke of no length is one sphere with its mean power. False, and nothing is
+ * added, if no part of it meets the domain.
  */
 bool StrokeToSpheres(const Grid& grid, const Stroke& stroke, std::vector<SphereSource>& spheres);
 
