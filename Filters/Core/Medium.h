@@ -46,7 +46,7 @@ struct MediumParameters
 {
   bool useGradient = true;
   bool complement = false;
-  bool rational = false; ///< beta = 1 / (1 + (g / sigma)^2) instead of the exponential
+  bool rational = false;     ///< beta = 1 / (1 + (g / sigma)^2) instead of the exponential
   double gradientScale = 0.; ///< sigma; 0: ChooseGradientScale
   std::array<int, 3> scalePoint{ { -1, -1, -1 } };
   double derivativeScale = 1.;

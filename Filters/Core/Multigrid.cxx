@@ -259,23 +259,49 @@ std::int64_t rowsOf(const DiffusionOperator& A)
   return static_cast<std::int64_t>(A.dims[1]) * A.dims[2];
 }
 
-/** One half-sweep over the voxels with (i + j + k + colour) even. */
+/**
+ * One half-sweep over the voxels with (i + j + k + colour) even. relaxRow reads
+ * and rewrites a row's other colour as well, which keeps its loop straight; and it
+ * reads the value before the row and the one after it. So no two rows that are
+ * neighbours, in space or in memory, may be in two threads at a time. Slabs, a few
+ * rows thick along the longer of y and z, see to it: first all even ones in
+ * parallel, then the odd ones. Their number is even: along y the last slab's rows
+ * are followed, in memory, by the first slab's.
+ */
 void relax(
   const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
 {
+  constexpr int thickness = 4;
   const int nx = A.dims[0];
-  ForRows(parallelFor, rowsOf(A), A.size(),
-    [&](std::int64_t begin, std::int64_t end)
-    {
-      Buffer<float> tmp(nx);
-      for (std::int64_t r = begin; r < end; ++r)
+  const int ny = A.dims[1];
+  const int nz = A.dims[2];
+  const bool alongZ = nz >= ny;
+  const std::int64_t length = alongZ ? nz : ny;
+  const std::int64_t pairs = std::max<std::int64_t>(1, length / (2 * thickness));
+  for (int odd = 0; odd < 2; ++odd)
+  {
+    ForRows(parallelFor, pairs, A.size(),
+      [&](std::int64_t begin, std::int64_t end)
       {
-        const RowView v = viewRow(A, x, r);
-        const std::int64_t o = r * nx;
-        const int parity = static_cast<int>((r % A.dims[1] + r / A.dims[1] + colour) & 1);
-        relaxRow(nx, parity, facesOfRow(A, r), v.xS, v.xN, v.xB, v.xT, b + o, tmp.data(), x + o);
-      }
-    });
+        Buffer<float> tmp(nx);
+        for (std::int64_t pair = begin; pair < end; ++pair)
+        {
+          const int from = static_cast<int>(length * (2 * pair + odd) / (2 * pairs));
+          const int to = static_cast<int>(length * (2 * pair + odd + 1) / (2 * pairs));
+          for (int k = alongZ ? from : 0; k < (alongZ ? to : nz); ++k)
+          {
+            for (int j = alongZ ? 0 : from; j < (alongZ ? ny : to); ++j)
+            {
+              const std::int64_t r = j + static_cast<std::int64_t>(ny) * k;
+              const RowView v = viewRow(A, x, r);
+              const std::int64_t o = r * nx;
+              relaxRow(nx, (j + k + colour) & 1, facesOfRow(A, r), v.xS, v.xN, v.xB, v.xT, b + o,
+                tmp.data(), x + o);
+            }
+          }
+        }
+      });
+  }
 }
 
 void start(
