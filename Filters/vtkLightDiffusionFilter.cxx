@@ -256,7 +256,7 @@ int vtkLightDiffusionFilter::RequestData(
   {
     try
     {
-      ok = this->CheckParameters(problem) && this->Execute(input, output, problem);
+      ok = this->CheckParameters(problem) && this->Solve(input, output, problem);
     }
     catch (const std::bad_alloc&)
     {
@@ -281,8 +281,7 @@ int vtkLightDiffusionFilter::RequestData(
 }
 
 //------------------------------------------------------------------------------
-bool vtkLightDiffusionFilter::Execute(
-  vtkImageData* input, vtkImageData* output, std::string& problem)
+bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, std::string& problem)
 {
   namespace names = vtkLightTransportArrays;
   using lighttransport::DiffusionReport;

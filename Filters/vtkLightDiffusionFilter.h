@@ -278,7 +278,7 @@ private:
   void operator=(const vtkLightDiffusionFilter&) = delete;
 
   bool CheckParameters(std::string& problem) const;
-  bool Execute(vtkImageData* input, vtkImageData* output, std::string& problem);
+  bool Solve(vtkImageData* input, vtkImageData* output, std::string& problem);
   void WriteReport(vtkImageData* output) const;
   void ClearReport();
 
