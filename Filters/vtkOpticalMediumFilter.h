@@ -145,10 +145,10 @@ public:
   /**
    * sigma, in scalar units per length (1/length for FromTransferFunctionGradient):
    * beta is 1/e where the gradient has this length. Finite, >= 0.
-   * The default 0 chooses it from the data, 2.1 times the median gradient of the
-   * regions that vary (Black et al.: Robust anisotropic diffusion, 1998; the rule
-   * is in Filters/Core/Medium.h), in the neighbourhood of ScalePoint if there is
-   * one, else in the whole volume. It follows when the scalars or the lengths are
+   * The default 0 chooses it from the data: 2.1 times the median gradient of what
+   * varies in the neighbourhood of ScalePoint (Black et al.: Robust anisotropic
+   * diffusion, 1998; the rule is in Filters/Core/Medium.h), or, without one, 2.1
+   * times the lower quartile of what varies in the whole volume. It follows when the scalars or the lengths are
    * rescaled. Too small, and noise stops light after a few voxels; too large, and
    * light passes through weak edges. Near the point where light starts the choice
    * is better: set ScalePoint.

@@ -28,9 +28,9 @@ double Quantile(std::vector<float>& samples, double fraction)
 }
 
 /** The rule on positive samples. */
-double RobustScale(std::vector<float>& samples)
+double RobustScale(std::vector<float>& samples, double quantile)
 {
-  return std::sqrt(2.) * 1.4826 * Quantile(samples, 0.5);
+  return std::sqrt(2.) * 1.4826 * Quantile(samples, quantile);
 }
 
 /** A stride that meets every row, column and slice in turn. */
@@ -91,13 +91,13 @@ double ChooseGradientScale(
     }
     if (static_cast<std::int64_t>(near.size()) >= MinimumSamples)
     {
-      return RobustScale(near);
+      return RobustScale(near, 0.5);
     }
   }
   samples.erase(
     std::remove_if(samples.begin(), samples.end(), [flat](float g) { return !(g > flat); }),
     samples.end());
-  return samples.empty() ? 0. : RobustScale(samples);
+  return samples.empty() ? 0. : RobustScale(samples, 0.25);
 }
 
 //------------------------------------------------------------------------------

@@ -28,8 +28,10 @@ namespace lighttransport
  *
  * `point` (a voxel, or a negative first index for none) limits the samples to
  * the voxels within 20 smallest spacings of it along each axis, if at least 64
- * of them vary; else at most about a million voxels of the whole volume are
- * looked at. Where nothing varies the result is 0. Scales with g.
+ * of them vary. Else at most about a million voxels of the whole volume are
+ * looked at, and the lower quartile takes the median's place: of all that varies
+ * in a volume, half and more may be edges. Where nothing varies the result is 0.
+ * Scales with g.
  */
 double ChooseGradientScale(
   const Grid& grid, const float* gradients, const std::array<int, 3>& point);

@@ -26,14 +26,16 @@ ValueReader readerOf(const std::vector<double>& values)
 
 void gradientScale(Suite& suite)
 {
-  // Evenly spread in (0, 1): the lowest 1 % is flat, so the median is .505.
+  // Evenly spread in (0, 1): the lowest 1 % is flat, so the median is .505 and the
+  // lower quartile, which counts in a whole volume, .2575.
   const Grid grid{ { { 50, 50, 50 } }, { { 1., 1., 1. } } };
   std::vector<float> g(grid.size());
   for (std::size_t i = 0; i < g.size(); ++i)
   {
     g[i] = static_cast<float>((double((i * 7919) % g.size()) + 0.5) / double(g.size()));
   }
-  const double expected = std::sqrt(2.) * 1.4826 * 0.505;
+  const double expected = std::sqrt(2.) * 1.4826 * 0.2575;
+  const double near = std::sqrt(2.) * 1.4826 * 0.505;
   LT_CHECK_CLOSE(suite, ChooseGradientScale(grid, g.data(), Nowhere), expected, 1e-3);
 
   // Flat regions and walls do not count, however many there are.
@@ -67,12 +69,11 @@ void gradientScale(Suite& suite)
   }
   const double strong = ChooseGradientScale(grid, halves.data(), { { 25, 25, 3 } });
   const double weak = ChooseGradientScale(grid, halves.data(), { { 25, 25, 47 } });
-  LT_CHECK_CLOSE(suite, strong, expected, 0.05);
-  LT_CHECK_CLOSE(suite, weak, 0.1 * expected, 0.1);
+  LT_CHECK_CLOSE(suite, strong, near, 0.05);
+  LT_CHECK_CLOSE(suite, weak, 0.1 * near, 0.1);
   // The neighbourhood is a length: with thick slices it holds fewer of them.
   const Grid thick{ { { 50, 50, 50 } }, { { 1., 1., 8. } } };
-  LT_CHECK_CLOSE(
-    suite, ChooseGradientScale(thick, halves.data(), { { 25, 25, 21 } }), expected, 0.05);
+  LT_CHECK_CLOSE(suite, ChooseGradientScale(thick, halves.data(), { { 25, 25, 21 } }), near, 0.05);
 
   // Nothing near: the whole volume. Nothing at all: 0. All the same: their value.
   std::vector<float> corner(g.size(), 0.f);
@@ -252,7 +253,7 @@ void chosen(Suite& suite)
       across = std::max<double>(across, medium.D[grid.index(19, j, k)]);
     }
   }
-  LT_CHECK(suite, inside > 0.7);
+  LT_CHECK(suite, inside > 0.5);
   LT_CHECK(suite, across < 1e-5);
 
   // Other units of the scalar or of length: the same medium.
