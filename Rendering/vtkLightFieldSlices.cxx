@@ -423,6 +423,14 @@ const FieldExtremes& Remember(vtkDataArray* array, int components, FieldExtremes
   return extremes;
 }
 
+/** "" or that an enumerator is none. */
+std::string CheckChoice(const char* name, int value, int last)
+{
+  return value >= 0 && value <= last
+    ? std::string()
+    : name + (" is " + std::to_string(value)) + "; expected: 0 to " + std::to_string(last) + ". ";
+}
+
 /** "" or what is wrong with an image as such. */
 std::string CheckImage(vtkImageData* image, const std::string& what)
 {
@@ -500,7 +508,14 @@ bool vtkLightFieldSlices::vtkInternals::Build(
   vtkLightFieldSlices* self, vtkImageData* anatomy, vtkImageData* light)
 {
   lighttransport::AnatomyLook anatomyLook;
-  std::string problem = this->CheckAnatomy(self, anatomy, anatomyLook.array);
+  std::string problem = CheckChoice("PatientAxes", self->PatientAxes, LPS);
+  problem += CheckChoice("Convention", self->Convention, Neurological);
+  problem += CheckChoice("ArrowLength", self->ArrowLength, UniformLength);
+  problem += CheckChoice("Layout", self->Layout, Grid);
+  if (problem.empty())
+  {
+    problem = this->CheckAnatomy(self, anatomy, anatomyLook.array);
+  }
   if (!problem.empty())
   {
     vtkErrorWithObjectMacro(self, << problem << ".");

@@ -223,6 +223,44 @@ void testPlaces(Suite& suite)
     }
   }
 
+  // An oblique scan: slices follow it, each letter is the nearest one.
+  vtkNew<vtkMatrix3x3> turn;
+  const double c = std::cos(0.26);
+  const double s = std::sin(0.26);
+  const double aboutZ[9] = { c, s, 0, -s, c, 0, 0, 0, 1 };
+  const double aboutX[9] = { 1, 0, 0, 0, c, -s, 0, s, c };
+  Direction oblique;
+  vtkMatrix3x3::Multiply3x3(aboutZ, aboutX, oblique.data());
+  vtkNew<vtkLightFieldSlices> turned;
+  turned->SetInputData(makeAnatomy(oblique));
+  turned->SetLightFieldData(makeLight(SagittalAxes));
+  turned->SetPatientAxes(vtkLightFieldSlices::RAS);
+  turned->ShowArrowsOn();
+  turned->Update();
+  LT_CHECK(suite, turned->GetMarks(0) == "RLPA");
+  LT_CHECK(suite, turned->GetMarks(1) == "RLIS");
+  LT_CHECK(suite, turned->GetMarks(2) == "APIS");
+  for (int slice = 0; slice < 3; ++slice)
+  {
+    // Arrows lie in the plane of the slice: its normal is a column of the matrix.
+    const int axis = slice == 0 ? 2 : slice == 1 ? 1 : 0;
+    const double normal[3] = { oblique[axis], oblique[3 + axis], oblique[6 + axis] };
+    vtkPolyData* arrows = turned->GetArrows(slice);
+    LT_CHECK(suite, arrows->GetNumberOfPoints() > 100);
+    double farthest = 0.;
+    for (vtkIdType id = 0; id < arrows->GetNumberOfPoints(); ++id)
+    {
+      double p[3];
+      arrows->GetPoint(id, p);
+      const double* position = turned->GetPosition();
+      const double toPoint[3] = { p[0] - position[0], p[1] - position[1], p[2] - position[2] };
+      farthest = std::max(farthest, std::abs(vtkMath::Dot(toPoint, normal)));
+    }
+    LT_CHECK(suite, farthest < 1e-9);
+  }
+  checkQuarter(suite, turned, 0, false, true, "oblique");
+  checkQuarter(suite, turned, 1, false, false, "oblique");
+
   // Nothing known: the volume's own axes, i and j to the right, and no marks.
   vtkNew<vtkLightFieldSlices> slices;
   slices->SetInputData(makeAnatomy(LPSAxes));
@@ -713,12 +751,15 @@ void testErrors(Suite& suite)
   slices->SetInputData(makeAnatomy(RASAxes));
   slices->SetComponent(1);
   checkError(suite, window, errors, "Component is 1", __LINE__);
+  slices->SetComponent(0);
+  slices->SetPatientAxes(3);
+  checkError(suite, window, errors, "PatientAxes is 3", __LINE__);
   // Nothing is shown of it all: the background.
   const Color mean = regionMean(capture(window), 0, 0, 99, 99);
   LT_CHECK(suite, mean[0] == 64. && mean[1] == 64.);
 
   // A bad light leaves the anatomy.
-  slices->SetComponent(0);
+  slices->SetPatientAxes(vtkLightFieldSlices::Unknown);
   slices->SetLightFieldData(empty);
   checkError(suite, window, errors, "light field (input port 1) is empty", __LINE__);
   Image unnamed = makeImage(RASAxes, { 4, 4, 4 }, { 1., 1., 1. });
