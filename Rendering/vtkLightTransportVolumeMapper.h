@@ -45,6 +45,10 @@
  *   sample that was projected
  * - average and additive: the light has no place there and is left out
  *
+ * A shader is built for a new mode, for what makes the superclass build one, and
+ * when light comes or goes (a strength to or from 0), then mostly from the cache;
+ * colours, windows, strengths, opacities and fields are uniforms and textures.
+ *
  * Also without light, exactly the superclass's picture: Strength 0, no light
  * field, a field of zeros, hardware selection (the light can't be picked), a
  * vtkMultiVolume and UseDepthPass (one warning each). What is wrong with a light

@@ -470,6 +470,7 @@ int main(int argc, char* argv[])
   {
     return Suite::skipped();
   }
+  KeepDisplay keep;
   testColors(suite);
   testOpacity(suite);
   testScales(suite);

@@ -579,6 +579,7 @@ int main(int argc, char* argv[])
   {
     return Suite::skipped();
   }
+  KeepDisplay keep;
   testConfigurations(suite);
   testClipping(suite);
   testViews(suite);

@@ -85,6 +85,20 @@ inline vtkSmartPointer<Observer> observe(vtkObject* object)
   return observer;
 }
 
+/**
+ * A window that stays: an X server without clients resets, and refuses the
+ * window that the next sub-case opens meanwhile.
+ */
+struct KeepDisplay
+{
+  KeepDisplay()
+  {
+    this->window->SetSize(16, 16);
+    this->window->Render();
+  }
+  vtkNew<vtkRenderWindow> window;
+};
+
 using Point = std::array<double, 3>;
 
 /** n^3 points over [0, n-1]^3. */
