@@ -265,7 +265,8 @@ int vtkLightSeedFilter::RequestData(
   catch (const std::bad_alloc&)
   {
     problem = "not enough memory for a float array of " +
-      std::to_string(input->GetNumberOfPoints()) + " points";
+      std::to_string(input->GetNumberOfPoints()) + " points, " +
+      std::to_string(input->GetNumberOfPoints() / (1 << 18)) + " MiB";
   }
   if (!problem.empty())
   {

@@ -256,7 +256,8 @@ int vtkOpticalMediumFilter::RequestData(
   catch (const std::bad_alloc&)
   {
     problem = "not enough memory for two float arrays of " +
-      std::to_string(input->GetNumberOfPoints()) + " points";
+      std::to_string(input->GetNumberOfPoints()) + " points, " +
+      std::to_string(input->GetNumberOfPoints() / (1 << 17)) + " MiB";
   }
   if (!problem.empty())
   {

@@ -25,7 +25,8 @@
  *      FromScalarGradient            beta = exp(-(|grad S| / sigma)^2)
  *      FromTransferFunctionGradient  beta = exp(-(|grad f(S)| / sigma)^2)
  *    with f = DiffusionFunction, sigma = GradientScale, and 1 - beta in place of
- *    beta when DiffusionComplement is on.
+ *    beta when DiffusionComplement is on. GradientFunction Rational takes
+ *    1 / (1 + (|grad S| / sigma)^2) for the exponential.
  * 3. The gradient is that of a local linear fit with Gaussian weights of
  *    standard deviation DerivativeScale (Knutsson, Westin: Normalized and
  *    differential convolution, CVPR 1993): exact for a linear S everywhere,
@@ -144,14 +145,15 @@ public:
   ///@{
   /**
    * sigma, in scalar units per length (1/length for FromTransferFunctionGradient):
-   * beta is 1/e where the gradient has this length. Finite, >= 0.
+   * beta is 1/e (1/2 for Rational) where the gradient has this length. Finite,
+   * >= 0.
    * The default 0 chooses it from the data: 2.1 times the median gradient of what
    * varies in the neighbourhood of ScalePoint (Black et al.: Robust anisotropic
    * diffusion, 1998; the rule is in Filters/Core/Medium.h), or, without one, 2.1
-   * times the lower quartile of what varies in the whole volume. It follows when the scalars or the lengths are
-   * rescaled. Too small, and noise stops light after a few voxels; too large, and
-   * light passes through weak edges. Near the point where light starts the choice
-   * is better: set ScalePoint.
+   * times the lower quartile of what varies in the whole volume. It follows when
+   * the scalars or the lengths are rescaled. Too small, and noise stops light
+   * after a few voxels; too large, and light passes through weak edges. Near the
+   * point where light starts the choice is better: set ScalePoint.
    */
   vtkSetMacro(GradientScale, double);
   vtkGetMacro(GradientScale, double);

@@ -15,11 +15,14 @@ namespace lighttransport
 /**
  * The gradient scale sigma of beta = exp(-(g / sigma)^2), chosen from gradient
  * lengths g by the robust rule of Black, Sapiro, Marimont, Heeger: Robust
- * anisotropic diffusion, IEEE Trans. Image Processing 7(3), 1998: with the median
- * absolute deviation of the gradients, whose own median is 0 as vectors,
+ * anisotropic diffusion, IEEE Trans. Image Processing 7(3), 1998: from the median
+ * absolute deviation of the gradients,
  *
  *   sigma_e = 1.4826 median(g),   sigma = sqrt(2) sigma_e.
  *
+ * The paper takes the deviation about the median length, which falls below the
+ * noise itself where noise is all there is; here it is about 0, the median of the
+ * gradients as vectors.
  * sigma_e separates the gradients of the bulk (noise, texture) from the outliers
  * (edges): with this sigma the flux g beta(g) has its maximum at sigma_e and falls
  * beyond. At the median gradient beta is 0.8. Only regions that vary count:
