@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <mutex>
 #include <sstream>
 
 namespace lighttransport
@@ -44,20 +46,22 @@ struct DoubleRow
   const double *x, *xS, *xN, *xB, *xT;
 };
 
-DoubleRow doubleRow(const DiffusionOperator& A, const double* x, std::int64_t r)
+DoubleRow doubleRow(
+  const DiffusionOperator& A, const double* x, std::int64_t row, std::int64_t begin, int n)
 {
   const std::int64_t nx = A.dims[0];
   const std::int64_t ny = A.dims[1];
   const std::int64_t nz = A.dims[2];
-  const std::int64_t j = r % ny;
-  const std::int64_t k = r / ny;
-  const std::int64_t o = r * nx;
+  const std::int64_t j = row % ny;
+  const std::int64_t k = row / ny;
   const float* zeros = A.zeros.data();
+  const double* own = x + begin;
   // The face to a row outside has conductance 0: the row itself can stand for it.
-  return { A.dims[0], A.g[0].data() + o, A.g[1].data() + o, j > 0 ? A.g[1].data() + o - nx : zeros,
-    A.g[2].data() + o, k > 0 ? A.g[2].data() + o - nx * ny : zeros, A.s.data() + o, x + o,
-    j > 0 ? x + o - nx : x + o, j + 1 < ny ? x + o + nx : x + o, k > 0 ? x + o - nx * ny : x + o,
-    k + 1 < nz ? x + o + nx * ny : x + o };
+  return { n, A.g[0].data() + begin, A.g[1].data() + begin,
+    j > 0 ? A.g[1].data() + begin - nx : zeros, A.g[2].data() + begin,
+    k > 0 ? A.g[2].data() + begin - nx * ny : zeros, A.s.data() + begin, own,
+    j > 0 ? own - nx : own, j + 1 < ny ? own + nx : own, k > 0 ? own - nx * ny : own,
+    k + 1 < nz ? own + nx * ny : own };
 }
 
 LIGHTTRANSPORT_SIMD
@@ -520,12 +524,11 @@ void DiffusionSolver::prepareMultigrid()
 template <class T>
 double DiffusionSolver::norm(const RightHandSide<T>& b) const
 {
-  const int nx = this->box.dims[0];
-  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(),
-    [&](std::int64_t r)
+  return std::sqrt(SumEachRow(this->A, this->parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
     {
       double sum = 0.;
-      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+      for (std::int64_t i = o; i < o + n; ++i)
       {
         const double v = b.at(i);
         sum += v * v;
@@ -538,17 +541,15 @@ template <class T>
 double DiffusionSolver::residual(
   const RightHandSide<T>& b, const double* phi, float* out, double rScale) const
 {
-  const int nx = this->box.dims[0];
   const double inverse = 1. / rScale;
-  return std::sqrt(SumRows(this->parallelFor, this->rows(), this->box.size(),
-    [&](std::int64_t r)
+  return std::sqrt(SumEachRow(this->A, this->parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
     {
       static thread_local std::vector<double> y;
-      y.resize(static_cast<std::size_t>(nx));
-      applyDouble(doubleRow(this->A, phi, r), y.data());
+      y.resize(static_cast<std::size_t>(n));
+      applyDouble(doubleRow(this->A, phi, row, o, n), y.data());
       double sum = 0.;
-      const std::int64_t o = r * nx;
-      for (int i = 0; i < nx; ++i)
+      for (int i = 0; i < n; ++i)
       {
         const double v = b.at(o + i) - y[static_cast<std::size_t>(i)];
         sum += v * v;
@@ -562,13 +563,105 @@ double DiffusionSolver::residual(
 }
 
 //------------------------------------------------------------------------------
+void DiffusionSolver::estimateError(
+  const double* phi, const float* z, double step, DiffusionReport& report) const
+{
+  const DiffusionOperator& op = this->A;
+  const auto sum = [&](auto&& term)
+  {
+    return SumEachRow(op, this->parallelFor,
+      [&](std::int64_t, std::int64_t o, int n)
+      {
+        double s = 0.;
+        for (std::int64_t i = o; i < o + n; ++i)
+        {
+          s += term(i);
+        }
+        return s;
+      });
+  };
+  std::vector<double> rowLargest(static_cast<std::size_t>(op.numberOfRows()), 0.);
+  ForRows(this->parallelFor, op.numberOfRows(), op.activeSize,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t t = begin; t < end; ++t)
+      {
+        const std::int64_t row = op.row(t);
+        const Span span = op.span(row);
+        double m = 0.;
+        for (std::int64_t i = row * op.dims[0] + span.begin; i < row * op.dims[0] + span.end; ++i)
+        {
+          m = std::max(m, std::abs(phi[i]));
+        }
+        rowLargest[static_cast<std::size_t>(t)] = m;
+      }
+    });
+  const double largest = *std::max_element(rowLargest.begin(), rowLargest.end());
+  // |error| / |phi| in bins of a sixteenth of an octave: the top 13 bits of a float
+  constexpr int shift = 19;
+  std::vector<std::int64_t> counts(std::size_t(1) << (31 - shift), 0);
+  std::mutex guard;
+  ForRows(this->parallelFor, op.numberOfRows(), op.activeSize,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      std::vector<std::int64_t> mine(counts.size(), 0);
+      for (std::int64_t t = begin; t < end; ++t)
+      {
+        const std::int64_t row = op.row(t);
+        const Span span = op.span(row);
+        for (std::int64_t i = row * op.dims[0] + span.begin; i < row * op.dims[0] + span.end; ++i)
+        {
+          const double error = step * static_cast<double>(z[i]);
+          const double value = std::abs(phi[i] + error);
+          if (value >= 1e-6 * largest && value > 0.)
+          {
+            const float ratio = static_cast<float>(std::min(std::abs(error) / value, 1e30));
+            std::uint32_t bits;
+            std::memcpy(&bits, &ratio, sizeof(bits));
+            ++mine[bits >> shift];
+          }
+        }
+      }
+      const std::lock_guard<std::mutex> lock(guard);
+      for (std::size_t i = 0; i < counts.size(); ++i)
+      {
+        counts[i] += mine[i];
+      }
+    });
+  std::int64_t all = 0;
+  for (const std::int64_t count : counts)
+  {
+    all += count;
+  }
+  std::int64_t above = 0;
+  std::size_t bin = counts.size();
+  while (bin > 0 && (above + counts[bin - 1]) * 20 <= all)
+  {
+    above += counts[--bin];
+  }
+  const std::uint32_t bits = static_cast<std::uint32_t>(bin) << shift; // upper edge of that bin
+  float ratio;
+  std::memcpy(&ratio, &bits, sizeof(ratio));
+  report.estimatedError = static_cast<double>(ratio);
+  const double errors =
+    sum([&](std::int64_t i) { return step * step * double(z[i]) * double(z[i]); });
+  const double values = sum(
+    [&](std::int64_t i)
+    {
+      const double v = phi[i] + step * double(z[i]);
+      return v * v;
+    });
+  report.estimatedErrorL2 = values > 0. ? std::sqrt(errors / values) : 0.;
+}
+
+//------------------------------------------------------------------------------
 template <class T>
 void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   const DiffusionControl& control, double progressBegin, double progressEnd,
   DiffusionReport& report)
 {
+  const double began = now();
   const std::int64_t size = this->box.size();
-  const int nx = this->box.dims[0];
   const double bNorm = this->norm(b);
   if (bNorm == 0.)
   {
@@ -605,14 +698,41 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     return;
   }
 
+  // Passes ask every 20 ms whether to go on, and end at once if not.
+  double fraction = progressBegin;
+  bool cancelled = false;
+  double asked = now();
+  const auto goOn = [&]
+  {
+    asked = now();
+    cancelled = cancelled || (control.progress && !control.progress(fraction));
+    return !cancelled;
+  };
+  const ParallelFor watched = [&](std::int64_t n, const RangeBody& body)
+  {
+    // pieces of about a million values of the finest grid
+    const std::int64_t piece =
+      std::max<std::int64_t>(64, (std::int64_t(1) << 20) / this->box.dims[0]);
+    for (std::int64_t begin = 0; begin < n && !cancelled; begin += piece)
+    {
+      const std::int64_t length = std::min(piece, n - begin);
+      this->parallelFor(
+        length, [&](std::int64_t f, std::int64_t t) { body(begin + f, begin + t); });
+      if (now() - asked > 0.02)
+      {
+        goOn();
+      }
+    }
+  };
+  const ParallelFor& loop = control.progress ? watched : this->parallelFor;
+
   this->prepareMultigrid();
+  const DiffusionOperator& op = this->A;
   Buffer<float> r(size);
   Buffer<float> z(size);
   Buffer<float> p(size);
   Buffer<float> Ap(size);
-  report.bytes = std::max(report.bytes,
-    this->bytesHeld() + r.bytes() + z.bytes() + p.bytes() + Ap.bytes() +
-      size * static_cast<std::int64_t>(sizeof(double)));
+  report.bytes = std::max(report.bytes, this->bytesHeld() + op.activeSize * 24);
 
   const double rStart = rNorm;
   double rScale = rNorm; // r holds the residual divided by it
@@ -623,6 +743,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   double rz = 0.;
   double alpha = 0.;
   bool restart = false;
+  double seen = began;
   const auto finish = [&](StopReason reason)
   {
     const double last = this->residual<T>(b, phi, nullptr, 1.);
@@ -634,6 +755,12 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       report.reason = StopReason::NotFinite;
     }
   };
+  const auto cancel = [&]
+  {
+    report.residual = rNorm / bNorm;
+    report.reason = StopReason::Cancelled;
+    report.message = "cancelled; the residual is the recurrence's";
+  };
 
   for (int iteration = 0;; ++iteration)
   {
@@ -643,21 +770,49 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       return;
     }
     // 1. z = B r
-    this->multigrid.cycle(r.data(), z.data(), this->parallelFor);
+    this->multigrid.cycle(r.data(), z.data(), loop);
     report.fineApplications += 1. + 2. * this->multigrid.sweeps;
-    // 2. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
+    if (cancelled)
+    {
+      cancel();
+      return;
+    }
+    // 2. how far off is phi? B r is the error that a cycle sees; where slow components are
+    //    left, the step along it was longer than 1.
+    if (control.targetError > 0. || control.timeBudget > 0.)
+    {
+      this->estimateError(phi, z.data(), rScale * std::max(1., alpha), report);
+      if (iteration > 0 && control.targetError > 0. && report.estimatedError <= control.targetError)
+      {
+        finish(StopReason::Converged);
+        report.reason = StopReason::Converged;
+        return;
+      }
+      const double perIteration = (now() - began) / (iteration + 1);
+      if (iteration > 0 && control.timeBudget > 0. &&
+        now() - began + perIteration > control.timeBudget)
+      {
+        finish(StopReason::MaxIterations);
+        report.message = "the time budget is used up";
+        return;
+      }
+    }
+    // 3. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
     //    since a cycle in float is not quite linear
     double rzNew = 0.;
     double zAp = 0.;
     {
-      std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()));
-      ForRows(this->parallelFor, this->rows(), size,
+      std::vector<double> partial(2 * static_cast<std::size_t>(op.numberOfRows()));
+      ForRows(loop, op.numberOfRows(), op.activeSize,
         [&](std::int64_t begin, std::int64_t end)
         {
-          for (std::int64_t row = begin; row < end; ++row)
+          for (std::int64_t t = begin; t < end; ++t)
           {
-            twoDots(nx, z.data() + row * nx, r.data() + row * nx, Ap.data() + row * nx,
-              partial.data() + 2 * row);
+            const std::int64_t row = op.row(t);
+            const Span span = op.span(row);
+            const std::int64_t o = row * op.dims[0] + span.begin;
+            twoDots(span.end - span.begin, z.data() + o, r.data() + o, Ap.data() + o,
+              partial.data() + 2 * t);
           }
         });
       for (std::size_t i = 0; i < partial.size(); i += 2)
@@ -665,6 +820,11 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         rzNew += partial[i];
         zAp += partial[i + 1];
       }
+    }
+    if (cancelled)
+    {
+      cancel();
+      return;
     }
     if (!std::isfinite(rzNew) || !(rzNew > 0.))
     {
@@ -675,15 +835,17 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     const double beta = restart || iteration == 0 ? 0. : -alpha * zAp / rz;
     restart = false;
     rz = rzNew;
-    ForRows(this->parallelFor, this->rows(), size,
-      [&](std::int64_t begin, std::int64_t end)
-      {
-        combine((end - begin) * nx, static_cast<float>(beta), z.data() + begin * nx,
-          p.data() + begin * nx);
-      });
-    // 3. alpha = r . z / p . A p
-    const double pAp = Apply(this->A, p.data(), Ap.data(), this->parallelFor);
+    ForEachRow(op, loop,
+      [&](std::int64_t, std::int64_t o, int n)
+      { combine(n, static_cast<float>(beta), z.data() + o, p.data() + o); });
+    // 4. alpha = r . z / p . A p
+    const double pAp = Apply(op, p.data(), Ap.data(), loop);
     report.fineApplications += 1.;
+    if (cancelled)
+    {
+      cancel();
+      return;
+    }
     if (!std::isfinite(pAp) || !(pAp > 0.))
     {
       finish(std::isfinite(pAp) ? StopReason::Breakdown : StopReason::NotFinite);
@@ -691,18 +853,17 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       return;
     }
     alpha = rz / pAp;
-    // 4. phi += alpha p, r -= alpha A p
+    // 5. phi += alpha p, r -= alpha A p; not interrupted: phi stays a whole
     rNorm = rScale *
-      std::sqrt(SumRows(this->parallelFor, this->rows(), size,
-        [&](std::int64_t row)
+      std::sqrt(SumEachRow(op, this->parallelFor,
+        [&](std::int64_t, std::int64_t o, int n)
         {
-          const std::int64_t o = row * nx;
-          return update(nx, alpha * rScale, static_cast<float>(alpha), p.data() + o, Ap.data() + o,
+          return update(n, alpha * rScale, static_cast<float>(alpha), p.data() + o, Ap.data() + o,
             phi + o, r.data() + o);
         }));
     ++report.iterations;
 
-    // 5. trust only the recomputed residual, and refresh float's before its rounding shows
+    // 6. trust only the recomputed residual, and refresh float's before its rounding shows
     if (!std::isfinite(rNorm))
     {
       finish(StopReason::NotFinite);
@@ -744,22 +905,22 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       finish(StopReason::Diverged);
       return;
     }
-    if (control.progress)
+    const double done =
+      std::log(rStart / std::max(rNorm, goal)) / std::log(std::max(rStart / goal, 1. + 1e-9));
+    fraction = progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
+    if (control.intermediate && now() - seen >= control.intermediateInterval)
     {
-      const double done =
-        std::log(rStart / std::max(rNorm, goal)) / std::log(std::max(rStart / goal, 1. + 1e-9));
-      const double fraction =
-        progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
-      if (!control.progress(fraction))
-      {
-        finish(StopReason::Cancelled);
-        return;
-      }
+      control.intermediate(phi);
+      seen = now();
+    }
+    if (!goOn())
+    {
+      finish(StopReason::Cancelled);
+      return;
     }
   }
 }
 
-//------------------------------------------------------------------------------
 template <class T>
 void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& report) const
 {
@@ -1058,7 +1219,7 @@ DiffusionReport DiffusionSolver::stepExplicit(
       {
         double* LIGHTTRANSPORT_RESTRICT out = to + r * nx;
         const double* in = from + r * nx;
-        applyDouble(doubleRow(this->A, from, r), out);
+        applyDouble(doubleRow(this->A, from, r, r * nx, nx), out);
         double sum = 0.;
         for (int x = 0; x < nx; ++x)
         {

@@ -78,6 +78,14 @@ struct DiffusionMedium
 
 struct DiffusionReport
 {
+  /**
+   * Of phi against the exact solution of the discrete equations, over the voxels within
+   * six decades of the largest |phi|: the 95th percentile of |error| / |phi|, and the relative
+   * Euclidean norm; estimated from the last iteration. Negative where nothing was estimated.
+   */
+  double estimatedError = -1.;
+  double estimatedErrorL2 = -1.;
+
   StopReason reason = StopReason::BadInput;
   std::string message; ///< for a person, where the reason alone does not say all
   int iterations = 0;
@@ -99,7 +107,17 @@ struct DiffusionControl
 {
   double tolerance = 1e-8;
   int maxIterations = 500;
-  DiffusionProgress progress; ///< may be empty
+  DiffusionProgress progress; ///< may be empty; also called every 20 ms while a pass runs
+  /**
+   * Where above 0, the solve ends with Converged as soon as the estimated error (see
+   * DiffusionReport) is at or below it, or the tolerance is met.
+   */
+  double targetError = 0.;
+  /** Where above 0, seconds after which the best answer so far is returned (MaxIterations). */
+  double timeBudget = 0.;
+  /** Called with the field reached, after an iteration, at most once per interval (seconds). */
+  std::function<void(const double* phi)> intermediate;
+  double intermediateInterval = 0.1;
 };
 
 /**
@@ -196,6 +214,9 @@ private:
   std::int64_t rows() const;
   void boundaryOf(Boundary boundary);
   std::int64_t borderIndex(int d, const int at[3]) const;
+
+  /** 95th percentile and L2 norm of the error, were it `step` z. */
+  void estimateError(const double* phi, const float* z, double step, DiffusionReport& report) const;
 
   ParallelFor parallelFor;
   Grid box;

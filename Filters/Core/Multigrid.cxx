@@ -21,29 +21,27 @@ struct RowFaces
   const float *gx, *gy, *gyS, *gz, *gzB, *s;
 };
 
-RowView viewRow(const DiffusionOperator& A, const float* x, std::int64_t r)
+RowView viewRow(const DiffusionOperator& A, const float* x, std::int64_t row, std::int64_t begin)
 {
   const std::int64_t nx = A.dims[0];
   const std::int64_t ny = A.dims[1];
   const std::int64_t nz = A.dims[2];
-  const std::int64_t j = r % ny;
-  const std::int64_t k = r / ny;
-  const std::int64_t o = r * nx;
+  const std::int64_t j = row % ny;
+  const std::int64_t k = row / ny;
   const float* zeros = A.zeros.data();
-  return { x + o, j > 0 ? x + o - nx : zeros, j + 1 < ny ? x + o + nx : zeros,
-    k > 0 ? x + o - nx * ny : zeros, k + 1 < nz ? x + o + nx * ny : zeros };
+  return { x + begin, j > 0 ? x + begin - nx : zeros, j + 1 < ny ? x + begin + nx : zeros,
+    k > 0 ? x + begin - nx * ny : zeros, k + 1 < nz ? x + begin + nx * ny : zeros };
 }
 
-RowFaces facesOfRow(const DiffusionOperator& A, std::int64_t r)
+RowFaces facesOfRow(const DiffusionOperator& A, std::int64_t row, std::int64_t begin)
 {
   const std::int64_t nx = A.dims[0];
   const std::int64_t ny = A.dims[1];
-  const std::int64_t j = r % ny;
-  const std::int64_t k = r / ny;
-  const std::int64_t o = r * nx;
+  const std::int64_t j = row % ny;
+  const std::int64_t k = row / ny;
   const float* zeros = A.zeros.data();
-  return { A.g[0].data() + o, A.g[1].data() + o, j > 0 ? A.g[1].data() + o - nx : zeros,
-    A.g[2].data() + o, k > 0 ? A.g[2].data() + o - nx * ny : zeros, A.s.data() + o };
+  return { A.g[0].data() + begin, A.g[1].data() + begin, j > 0 ? A.g[1].data() + begin - nx : zeros,
+    A.g[2].data() + begin, k > 0 ? A.g[2].data() + begin - nx * ny : zeros, A.s.data() + begin };
 }
 
 /** x = (b + sum g x_j) / (sum g + s) on the voxels i of the row with (i + parity) even. */
@@ -161,29 +159,22 @@ inline float halfResistance(float g)
 }
 
 /**
- * The lines through the faces f = first, first + step, ... of a row, from coarse
- * centre to coarse centre: half the inner face on either side (`below`, `above`) in
- * series with the face between; above is null where the voxel there is its own
- * centre. Writes the weight of the other parent for both voxels at the face,
- * and the line's conductance (0 elsewhere) where that is asked for.
+ * The lines through the faces f = first, first + step, ... < last of a row, from
+ * coarse centre to coarse centre: half the inner face on either side (`below`,
+ * `above`) in series with the face between. Where the voxel above is its own centre
+ * (f >= paired, or no `above`), there is no inner face there. Writes the weight of the
+ * other parent for both voxels at the face, and the line's conductance where that
+ * is asked for.
  */
 LIGHTTRANSPORT_SIMD
-void lineRow(int n, int first, int step, int end, const float* between, const float* below,
+void lineRow(int first, int last, int step, int paired, const float* between, const float* below,
   const float* above, std::uint8_t* w, std::uint8_t* wNext, float* conductance)
 {
-  if (conductance && step > 1)
-  {
-    for (int i = 0; i < n; ++i)
-    {
-      conductance[i] = 0.f;
-    }
-  }
-  for (int i = first; i < end; i += step)
+  for (int i = first; i < last; i += step)
   {
     const float g = between[i];
     const float here = halfResistance(below[i]);
-    // along x (step 2) the last voxel of an odd row is its own centre
-    const float there = above && (step == 1 || i + 2 < n) ? halfResistance(above[i]) : 0.f;
+    const float there = above && i < paired ? halfResistance(above[i]) : 0.f;
     const float whole = here + 1.f / (g > 1e-30f ? g : 1e-30f) + there;
     const float open = g > 1e-30f ? 255.f / whole : 0.f;
     if (conductance)
@@ -254,9 +245,11 @@ void prolongRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx,
   }
 }
 
-std::int64_t rowsOf(const DiffusionOperator& A)
+/** (i + j + k + colour) & 1 of the first value of a row's span. */
+int parityOf(const DiffusionOperator& A, std::int64_t row, std::int64_t begin, int colour)
 {
-  return static_cast<std::int64_t>(A.dims[1]) * A.dims[2];
+  return static_cast<int>(
+    (begin - row * A.dims[0] + row % A.dims[1] + row / A.dims[1] + colour) & 1);
 }
 
 /**
@@ -272,7 +265,6 @@ void relax(
   const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
 {
   constexpr int thickness = 4;
-  const int nx = A.dims[0];
   const int ny = A.dims[1];
   const int nz = A.dims[2];
   const bool alongZ = nz >= ny;
@@ -280,10 +272,10 @@ void relax(
   const std::int64_t pairs = std::max<std::int64_t>(1, length / (2 * thickness));
   for (int odd = 0; odd < 2; ++odd)
   {
-    ForRows(parallelFor, pairs, A.size(),
+    ForRows(parallelFor, pairs, A.activeSize,
       [&](std::int64_t begin, std::int64_t end)
       {
-        Buffer<float> tmp(nx);
+        std::vector<float> tmp(static_cast<std::size_t>(A.dims[0]));
         for (std::int64_t pair = begin; pair < end; ++pair)
         {
           const int from = static_cast<int>(length * (2 * pair + odd) / (2 * pairs));
@@ -292,11 +284,15 @@ void relax(
           {
             for (int j = alongZ ? 0 : from; j < (alongZ ? ny : to); ++j)
             {
-              const std::int64_t r = j + static_cast<std::int64_t>(ny) * k;
-              const RowView v = viewRow(A, x, r);
-              const std::int64_t o = r * nx;
-              relaxRow(nx, (j + k + colour) & 1, facesOfRow(A, r), v.xS, v.xN, v.xB, v.xT, b + o,
-                tmp.data(), x + o);
+              const std::int64_t row = j + static_cast<std::int64_t>(ny) * k;
+              const Span span = A.span(row);
+              if (span.begin < span.end)
+              {
+                const std::int64_t o = row * A.dims[0] + span.begin;
+                const RowView v = viewRow(A, x, row, o);
+                relaxRow(span.end - span.begin, parityOf(A, row, o, colour), facesOfRow(A, row, o),
+                  v.xS, v.xN, v.xB, v.xT, b + o, tmp.data(), x + o);
+              }
             }
           }
         }
@@ -307,17 +303,9 @@ void relax(
 void start(
   const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
 {
-  const int nx = A.dims[0];
-  ForRows(parallelFor, rowsOf(A), A.size(),
-    [&](std::int64_t begin, std::int64_t end)
-    {
-      for (std::int64_t r = begin; r < end; ++r)
-      {
-        const std::int64_t o = r * nx;
-        const int parity = static_cast<int>((r % A.dims[1] + r / A.dims[1] + colour) & 1);
-        startRow(nx, parity, facesOfRow(A, r), b + o, x + o);
-      }
-    });
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    { startRow(n, parityOf(A, row, o, colour), facesOfRow(A, row, o), b + o, x + o); });
 }
 } // namespace
 
@@ -331,18 +319,63 @@ void DiffusionOperator::allocate(const std::array<int, 3>& n)
   }
   this->s.allocate(this->size());
   this->zeros.allocate(n[0]);
+  this->activeRows.clear();
+  this->spans.clear();
+  this->activeSize = this->size();
+}
+
+void DiffusionOperator::restrictTo(std::vector<Span> rowSpans)
+{
+  this->spans = std::move(rowSpans);
+  this->activeRows.clear();
+  this->activeSize = 0;
+  for (std::size_t r = 0; r < this->spans.size(); ++r)
+  {
+    if (this->spans[r].begin < this->spans[r].end)
+    {
+      this->activeRows.push_back(static_cast<std::int64_t>(r));
+      this->activeSize += this->spans[r].end - this->spans[r].begin;
+    }
+  }
 }
 
 std::int64_t DiffusionOperator::bytes() const
 {
-  return this->g[0].bytes() + this->g[1].bytes() + this->g[2].bytes() + this->s.bytes();
+  return 4 * static_cast<std::int64_t>(sizeof(float)) * this->activeSize +
+    static_cast<std::int64_t>(
+      this->spans.size() * sizeof(Span) + this->activeRows.size() * sizeof(std::int64_t));
+}
+
+void ForEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, const RowBody& body)
+{
+  ForRows(parallelFor, A.numberOfRows(), A.activeSize,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t t = begin; t < end; ++t)
+      {
+        const std::int64_t row = A.row(t);
+        const Span span = A.span(row);
+        body(row, row * A.dims[0] + span.begin, span.end - span.begin);
+      }
+    });
+}
+
+double SumEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, const RowSum& body)
+{
+  return SumRows(parallelFor, A.numberOfRows(), A.activeSize,
+    [&](std::int64_t t)
+    {
+      const std::int64_t row = A.row(t);
+      const Span span = A.span(row);
+      return body(row, row * A.dims[0] + span.begin, span.end - span.begin);
+    });
 }
 
 double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor)
 {
-  const int nx = A.dims[0];
-  return SumRows(parallelFor, rowsOf(A), A.size(),
-    [&](std::int64_t r) { return applyRow(nx, facesOfRow(A, r), viewRow(A, x, r), y + r * nx); });
+  return SumEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    { return applyRow(n, facesOfRow(A, row, o), viewRow(A, x, row, o), y + o); });
 }
 
 //------------------------------------------------------------------------------
@@ -357,8 +390,11 @@ std::int64_t Multigrid::bytes() const
   std::int64_t sum = 0;
   for (const Level& level : this->levels)
   {
-    sum += level.A.bytes() + level.x.bytes() + level.b.bytes() + level.r.bytes() +
-      level.w[0].bytes() + level.w[1].bytes() + level.w[2].bytes();
+    // what the domain touches of each: the rest of the memory stays with the system
+    const DiffusionOperator& A = &level == &this->levels.front() ? *this->finest : level.A;
+    const std::int64_t perVoxel = (level.x.empty() ? 0 : 8) + (level.r.empty() ? 0 : 4) +
+      static_cast<std::int64_t>(!level.w[0].empty()) + !level.w[1].empty() + !level.w[2].empty();
+    sum += level.A.bytes() + A.activeSize * perVoxel;
   }
   return sum;
 }
@@ -381,18 +417,17 @@ void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor
       if (fine->dims[d] > 1)
       {
         const float* g = fine->g[d].data();
-        const int nx = fine->dims[0];
-        mean[d] = SumRows(parallelFor, rowsOf(*fine), fine->size(),
-                    [&](std::int64_t r)
+        mean[d] = SumEachRow(*fine, parallelFor,
+                    [&](std::int64_t, std::int64_t o, int n)
                     {
                       double sum = 0.;
-                      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+                      for (std::int64_t i = o; i < o + n; ++i)
                       {
                         sum += static_cast<double>(g[i]);
                       }
                       return sum;
                     }) *
-          fine->dims[d] / (static_cast<double>(fine->size()) * (fine->dims[d] - 1));
+          fine->dims[d] / (fine->dims[d] - 1.);
         largest = std::max(largest, mean[d]);
       }
     }
@@ -432,35 +467,50 @@ void Multigrid::coarsen(
   coarse.A.allocate(nc);
   coarse.x.allocate(coarse.A.size());
   coarse.b.allocate(coarse.A.size());
+  if (!A.spans.empty())
+  {
+    std::vector<Span> spans(static_cast<std::size_t>(nc[1]) * nc[2], Span{ nc[0], 0 });
+    for (const std::int64_t row : A.activeRows)
+    {
+      const std::int64_t J = row % n[1] / (fine.halved[1] ? 2 : 1);
+      const std::int64_t K = row / n[1] / (fine.halved[2] ? 2 : 1);
+      Span& span = spans[static_cast<std::size_t>(J + nc[1] * K)];
+      const Span child = A.span(row);
+      span.begin = std::min(span.begin, fine.halved[0] ? child.begin / 2 : child.begin);
+      span.end = std::max(span.end, fine.halved[0] ? (child.end + 1) / 2 : child.end);
+    }
+    coarse.A.restrictTo(std::move(spans));
+  }
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
 
   // 3. the weights, from the lines through the coarse faces
   const auto forLines = [&](int d, float* conductance)
   {
-    ForRows(parallelFor, rowsOf(A), A.size(),
-      [&](std::int64_t begin, std::int64_t end)
+    ForEachRow(A, parallelFor,
+      [&](std::int64_t row, std::int64_t o, int length)
       {
-        for (std::int64_t row = begin; row < end; ++row)
+        if (conductance)
         {
-          const int at = d == 1 ? static_cast<int>(row % n[1]) : static_cast<int>(row / n[1]);
-          const std::int64_t o = row * n[0];
+          std::fill(conductance + o, conductance + o + length, 0.f);
+        }
+        if (d == 0)
+        {
+          // faces after the odd voxels; the last voxel of an odd row is its own centre
+          const std::int64_t begin = row * n[0];
+          const int first = static_cast<int>(o - begin) | 1;
+          const int last = std::min(static_cast<int>(o - begin) + length, n[0] - 1);
+          const float* g = A.g[0].data() + begin;
+          lineRow(first, last, 2, n[0] - 2, g, g - 1, g + 1, fine.w[0].data() + begin,
+            fine.w[0].data() + begin + 1, conductance ? conductance + begin : nullptr);
+          return;
+        }
+        const int at = d == 1 ? static_cast<int>(row % n[1]) : static_cast<int>(row / n[1]);
+        if (at % 2 == 1 && at + 1 < n[d])
+        {
           const float* g = A.g[d].data() + o;
-          if (d == 0)
-          {
-            lineRow(n[0], 1, 2, n[0] - 1, g, g - 1, g + 1, fine.w[0].data() + o,
-              fine.w[0].data() + o + 1, conductance ? conductance + o : nullptr);
-          }
-          else if (at % 2 == 1 && at + 1 < n[d])
-          {
-            // a lone last voxel is its own centre: an inner face that resists nothing
-            const float* there = at + 2 < n[d] ? g + stride[d] : nullptr;
-            lineRow(n[0], 0, 1, n[0], g, g - stride[d], there, fine.w[d].data() + o,
-              fine.w[d].data() + o + stride[d], conductance ? conductance + o : nullptr);
-          }
-          else if (conductance)
-          {
-            std::fill(conductance + o, conductance + o + n[0], 0.f);
-          }
+          const float* above = at + 2 < n[d] ? g + stride[d] : nullptr;
+          lineRow(0, length, 1, length, g, g - stride[d], above, fine.w[d].data() + o,
+            fine.w[d].data() + o + stride[d], conductance ? conductance + o : nullptr);
         }
       });
   };
@@ -483,29 +533,28 @@ void Multigrid::coarsen(
     gather(A, fine, coarse.A, lines, d, coarse.A.g[d].data(), parallelFor);
   }
   // Sinks stay with the parent: a strong one pulls its own voxel down, not the neighbour's.
-  ForRows(parallelFor, rowsOf(coarse.A), A.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  ForEachRow(coarse.A, parallelFor,
+    [&](std::int64_t row, std::int64_t, int)
     {
-      for (std::int64_t row = begin; row < end; ++row)
+      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+      int first[3];
+      int last[3];
+      for (int d = 1; d < 3; ++d)
       {
-        const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-        int first[3];
-        int last[3];
-        for (int d = 1; d < 3; ++d)
+        first[d] = fine.halved[d] ? 2 * J[d] : J[d];
+        last[d] = fine.halved[d] ? std::min(2 * J[d] + 1, n[d] - 1) : J[d];
+      }
+      float* sink = coarse.A.s.data() + row * nc[0];
+      for (int k = first[2]; k <= last[2]; ++k)
+      {
+        for (int j = first[1]; j <= last[1]; ++j)
         {
-          first[d] = fine.halved[d] ? 2 * J[d] : J[d];
-          last[d] = fine.halved[d] ? std::min(2 * J[d] + 1, n[d] - 1) : J[d];
-        }
-        float* sink = coarse.A.s.data() + row * nc[0];
-        for (int k = first[2]; k <= last[2]; ++k)
-        {
-          for (int j = first[1]; j <= last[1]; ++j)
+          const std::int64_t child = j + static_cast<std::int64_t>(n[1]) * k;
+          const Span span = A.span(child);
+          const float* s = A.s.data() + child * n[0];
+          for (int i = span.begin; i < span.end; ++i)
           {
-            const float* s = A.s.data() + stride[1] * j + stride[2] * k;
-            for (int i = 0; i < n[0]; ++i)
-            {
-              sink[fine.halved[0] ? i / 2 : i] += s[i];
-            }
+            sink[fine.halved[0] ? i / 2 : i] += s[i];
           }
         }
       }
@@ -520,65 +569,61 @@ void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Diff
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = C.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
-  ForRows(parallelFor, rowsOf(C), A.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  ForEachRow(C, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int length)
     {
-      Buffer<float> own(n[0] + 2);
-      Buffer<float> next(n[0] + 2);
-      for (std::int64_t row = begin; row < end; ++row)
+      // own: what goes to the parent; next: to its neighbour along x. Two zeros on either side.
+      static thread_local std::vector<float> store;
+      store.assign(2 * static_cast<std::size_t>(n[0] + 4), 0.f);
+      float* own = store.data() + 2;
+      float* next = own + n[0] + 4;
+      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+      int first[3];
+      int last[3];
+      for (int d = 1; d < 3; ++d)
       {
-        std::fill(own.data(), own.data() + n[0], 0.f);
-        std::fill(next.data(), next.data() + n[0], 0.f);
-        const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-        int first[3];
-        int last[3];
-        for (int d = 1; d < 3; ++d)
+        first[d] = !fine.halved[d] ? J[d] : d == along ? 2 * J[d] + 1 : std::max(0, 2 * J[d] - 1);
+        last[d] = !fine.halved[d] ? J[d]
+          : d == along            ? std::min(2 * J[d] + 1, n[d] - 1)
+                                  : std::min(2 * J[d] + 2, n[d] - 1);
+      }
+      for (int k = first[2]; k <= last[2]; ++k)
+      {
+        for (int j = first[1]; j <= last[1]; ++j)
         {
-          first[d] = !fine.halved[d] ? J[d] : d == along ? 2 * J[d] + 1 : std::max(0, 2 * J[d] - 1);
-          last[d] = !fine.halved[d] ? J[d]
-            : d == along            ? std::min(2 * J[d] + 1, n[d] - 1)
-                                    : std::min(2 * J[d] + 2, n[d] - 1);
-        }
-        for (int k = first[2]; k <= last[2]; ++k)
-        {
-          for (int j = first[1]; j <= last[1]; ++j)
+          const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+          if (span.begin >= span.end)
           {
-            const std::int64_t o = stride[1] * j + stride[2] * k;
-            const int at[3] = { 0, j, k };
-            // a line's weights are the mean of those at its two ends
-            const bool ends = along >= 0 && at[along] + 1 < n[along];
-            const std::int64_t other = ends ? stride[along] : 0;
-            Weights weights[3];
-            for (int d = 0; d < 3; ++d)
+            continue;
+          }
+          const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
+          const int at[3] = { 0, j, k };
+          // a line's weights are the mean of those at its two ends
+          const bool ends = along >= 0 && at[along] + 1 < n[along];
+          const std::int64_t other = ends ? stride[along] : 0;
+          Weights weights[3];
+          for (int d = 0; d < 3; ++d)
+          {
+            if (fine.halved[d] && d != along)
             {
-              if (fine.halved[d] && d != along)
-              {
-                const std::uint8_t* w = fine.w[d].data() + o;
-                const bool parent = d == 0 || at[d] / 2 == J[d];
-                weights[d] = { w, w + other, parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
-              }
-              else
-              {
-                weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 1.f, 0.f };
-              }
+              const std::uint8_t* w = fine.w[d].data() + f;
+              const bool parent = d == 0 || at[d] / 2 == J[d];
+              weights[d] = { w, w + other, parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
             }
-            gatherRow(n[0], v + o, weights[0], weights[1], weights[2], own.data(), next.data());
+            else
+            {
+              weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 1.f, 0.f };
+            }
           }
+          gatherRow(span.end - span.begin, v + f, weights[0], weights[1], weights[2],
+            own + span.begin, next + span.begin);
         }
-        float* c = out + row * nc[0];
-        if (fine.halved[0])
-        {
-          const float* p = own.data();
-          const float* q = next.data();
-          for (int i = 0; i < nc[0]; ++i)
-          {
-            c[i] = p[2 * i] + p[2 * i + 1] + q[2 * i - 1] + q[2 * i + 2];
-          }
-        }
-        else
-        {
-          std::copy(own.data(), own.data() + nc[0], c);
-        }
+      }
+      const int begin = static_cast<int>(o - row * nc[0]);
+      for (int i = begin; i < begin + length; ++i)
+      {
+        out[row * nc[0] + i] =
+          fine.halved[0] ? own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2] : own[i];
       }
     });
 }
@@ -588,78 +633,68 @@ void Multigrid::prolong(const DiffusionOperator& A, const Level& fine, const Lev
 {
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = coarse.A.dims;
-  ForRows(parallelFor, rowsOf(A), A.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int length)
     {
-      Buffer<float> up[4];
-      Buffer<float> side[4];
+      static thread_local std::vector<float> store;
+      const std::size_t room = static_cast<std::size_t>(n[0]) + 2;
+      store.resize(8 * room);
+      const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+      const int begin = static_cast<int>(o - row * n[0]);
+      // the parent's coordinate, and its neighbour's on this voxel's side
+      int J[3][2];
+      const std::uint8_t* w[3];
+      for (int d = 0; d < 3; ++d)
+      {
+        const int parent = fine.halved[d] ? at[d] / 2 : at[d];
+        const int neighbour = parent + (at[d] % 2 ? 1 : -1);
+        const bool inside = fine.halved[d] && neighbour >= 0 && neighbour < nc[d];
+        J[d][0] = parent;
+        J[d][1] = inside ? neighbour : parent;
+        w[d] = fine.halved[d] ? fine.w[d].data() + o : fine.noWeight.data();
+      }
+      const float* up[4];
+      const float* side[4];
       for (int c = 0; c < 4; ++c)
       {
-        up[c].allocate(n[0] + 1);
-        side[c].allocate(n[0] + 1);
-      }
-      for (std::int64_t row = begin; row < end; ++row)
-      {
-        const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-        const std::int64_t o = row * n[0];
-        // the parent's coordinate, and its neighbour's on this voxel's side
-        int J[3][2];
-        Weights weights[3];
-        for (int d = 0; d < 3; ++d)
+        const float* xc =
+          coarse.x.data() + nc[0] * (J[1][c & 1] + static_cast<std::int64_t>(nc[1]) * J[2][c >> 1]);
+        float* u = store.data() + 2 * static_cast<std::size_t>(c) * room;
+        float* s = u + room;
+        if (fine.halved[0])
         {
-          const int parent = fine.halved[d] ? at[d] / 2 : at[d];
-          const int neighbour = parent + (at[d] % 2 ? 1 : -1);
-          const bool inside = fine.halved[d] && neighbour >= 0 && neighbour < nc[d];
-          J[d][0] = parent;
-          J[d][1] = inside ? neighbour : parent;
-          const std::uint8_t* w = fine.halved[d] ? fine.w[d].data() + o : fine.noWeight.data();
-          weights[d] = { w, w, 1.f, -0.5f / 255.f };
-        }
-        for (int c = 0; c < 4; ++c)
-        {
-          const float* xc = coarse.x.data() +
-            nc[0] * (J[1][c & 1] + static_cast<std::int64_t>(nc[1]) * J[2][c >> 1]);
-          float* u = up[c].data();
-          float* s = side[c].data();
-          if (fine.halved[0])
+          for (int i = begin / 2; i <= (begin + length - 1) / 2; ++i)
           {
-            for (int i = 0; i < nc[0]; ++i)
-            {
-              u[2 * i] = u[2 * i + 1] = xc[i];
-              s[2 * i] = xc[i - 1];
-              s[2 * i + 1] = xc[i + 1];
-            }
-          }
-          else
-          {
-            std::copy(xc, xc + n[0], u);
+            u[2 * i] = u[2 * i + 1] = xc[i];
+            s[2 * i] = xc[i - 1];
+            s[2 * i + 1] = xc[i + 1];
           }
         }
-        const float* const u[4] = { up[0].data(), up[1].data(), up[2].data(), up[3].data() };
-        const float* const s[4] = { side[0].data(), side[1].data(), side[2].data(),
-          side[3].data() };
-        prolongRow(n[0], weights[0].here, weights[1].here, weights[2].here, u, s, x + o);
+        else
+        {
+          std::copy(xc + begin, xc + begin + length, u + begin);
+          std::copy(xc + begin, xc + begin + length, s + begin);
+        }
+        up[c] = u + begin;
+        side[c] = s + begin;
       }
+      prolongRow(length, w[0], w[1], w[2], up, side, x + o);
     });
 }
 
 void CloseIsolated(DiffusionOperator& A, float isolated, const ParallelFor& parallelFor)
 {
-  const int nx = A.dims[0];
-  ForRows(parallelFor, rowsOf(A), A.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      const RowFaces f = facesOfRow(A, row, o);
+      float* s = A.s.data() + o;
+      for (int i = 0; i < n; ++i)
       {
-        const RowFaces f = facesOfRow(A, r);
-        float* s = A.s.data() + r * nx;
-        for (int i = 0; i < nx; ++i)
+        const float den = f.gx[i] + f.gx[i - 1] + f.gy[i] + f.gyS[i] + f.gz[i] + f.gzB[i] + s[i];
+        if (!(den > 1e-30f))
         {
-          const float den = f.gx[i] + f.gx[i - 1] + f.gy[i] + f.gyS[i] + f.gz[i] + f.gzB[i] + s[i];
-          if (!(den > 1e-30f))
-          {
-            s[i] = isolated;
-          }
+          s[i] = isolated;
         }
       }
     });
@@ -668,37 +703,36 @@ void CloseIsolated(DiffusionOperator& A, float isolated, const ParallelFor& para
 //------------------------------------------------------------------------------
 void Multigrid::cycle(const float* b, float* x, const ParallelFor& parallelFor)
 {
-  this->cycle(0, *this->finest, b, x, parallelFor);
+  this->cycle(0, b, x, true, parallelFor);
 }
 
-void Multigrid::cycle(std::size_t l, const DiffusionOperator& A, const float* b, float* x,
-  const ParallelFor& parallelFor)
+void Multigrid::cycle(
+  std::size_t l, const float* b, float* x, bool fromZero, const ParallelFor& parallelFor)
 {
+  const DiffusionOperator& A = this->operatorOf(l);
   Level& fine = this->levels[l];
-  const bool coarsest = l + 1 == this->levels.size();
   // 4. smooth: red then black
-  start(A, 0, b, x, parallelFor);
-  relax(A, 1, b, x, parallelFor);
-  for (int sweep = 1; sweep < this->sweeps; ++sweep)
+  for (int sweep = 0; sweep < this->sweeps; ++sweep)
   {
-    relax(A, 0, b, x, parallelFor);
+    if (sweep == 0 && fromZero)
+    {
+      start(A, 0, b, x, parallelFor);
+    }
+    else
+    {
+      relax(A, 0, b, x, parallelFor);
+    }
     relax(A, 1, b, x, parallelFor);
   }
-  if (!coarsest)
+  if (l + 1 < this->levels.size())
   {
     Level& coarse = this->levels[l + 1];
     float* r = fine.r.data();
-    const int nx = A.dims[0];
-    ForRows(parallelFor, rowsOf(A), A.size(),
-      [&](std::int64_t begin, std::int64_t end)
-      {
-        for (std::int64_t row = begin; row < end; ++row)
-        {
-          residualRow(nx, facesOfRow(A, row), viewRow(A, x, row), b + row * nx, r + row * nx);
-        }
-      });
+    ForEachRow(A, parallelFor,
+      [&](std::int64_t row, std::int64_t o, int n)
+      { residualRow(n, facesOfRow(A, row, o), viewRow(A, x, row, o), b + o, r + o); });
     this->gather(A, fine, coarse.A, r, -1, coarse.b.data(), parallelFor);
-    this->cycle(l + 1, coarse.A, coarse.b.data(), coarse.x.data(), parallelFor);
+    this->cycle(l + 1, coarse.b.data(), coarse.x.data(), true, parallelFor);
     this->prolong(A, fine, coarse, x, parallelFor);
   }
   // 4. smooth: black then red
@@ -706,6 +740,29 @@ void Multigrid::cycle(std::size_t l, const DiffusionOperator& A, const float* b,
   {
     relax(A, 1, b, x, parallelFor);
     relax(A, 0, b, x, parallelFor);
+  }
+}
+
+void Multigrid::fullCycle(const float* b, float* x, const ParallelFor& parallelFor)
+{
+  const std::size_t last = this->levels.size() - 1;
+  const auto rhs = [&](std::size_t l) { return l == 0 ? b : this->levels[l].b.data(); };
+  const auto field = [&](std::size_t l) { return l == 0 ? x : this->levels[l].x.data(); };
+  for (std::size_t l = 0; l < last; ++l)
+  {
+    this->gather(this->operatorOf(l), this->levels[l], this->levels[l + 1].A, rhs(l), -1,
+      this->levels[l + 1].b.data(), parallelFor);
+  }
+  this->cycle(last, rhs(last), field(last), true, parallelFor);
+  for (std::size_t l = last; l-- > 0;)
+  {
+    const DiffusionOperator& A = this->operatorOf(l);
+    // The coarser cycles below use the coarser right-hand sides: this one's is still in place,
+    // since a cycle on level l + 1 writes those of l + 2 and beyond.
+    ForEachRow(A, parallelFor,
+      [&](std::int64_t, std::int64_t o, int n) { std::fill(field(l) + o, field(l) + o + n, 0.f); });
+    this->prolong(A, this->levels[l], this->levels[l + 1], field(l), parallelFor);
+    this->cycle(l, rhs(l), field(l), false, parallelFor);
   }
 }
 } // namespace lighttransport

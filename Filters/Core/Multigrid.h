@@ -38,9 +38,18 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
+#include <vector>
 
 namespace lighttransport
 {
+/** The values [begin, end) of a row that belong to the domain. */
+struct Span
+{
+  int begin = 0;
+  int end = 0;
+};
+
 /** One grid of the hierarchy: A's coefficients there. */
 struct DiffusionOperator
 {
@@ -50,13 +59,44 @@ struct DiffusionOperator
   Buffer<float> s;
   Buffer<float> zeros; // a row, read in place of rows outside
 
+  /**
+   * Where the domain is a part of the box: its rows, and the span of each row of the box.
+   * Coefficients and vectors are 0 elsewhere and their memory is not touched there. Empty: all.
+   */
+  std::vector<std::int64_t> activeRows;
+  std::vector<Span> spans;
+  std::int64_t activeSize = 0; ///< values within the spans
+
   std::int64_t size() const
   {
     return static_cast<std::int64_t>(this->dims[0]) * this->dims[1] * this->dims[2];
   }
+  std::int64_t numberOfRows() const
+  {
+    return this->spans.empty() ? static_cast<std::int64_t>(this->dims[1]) * this->dims[2]
+                               : static_cast<std::int64_t>(this->activeRows.size());
+  }
+  std::int64_t row(std::int64_t t) const
+  {
+    return this->spans.empty() ? t : this->activeRows[static_cast<std::size_t>(t)];
+  }
+  Span span(std::int64_t row) const
+  {
+    return this->spans.empty() ? Span{ 0, this->dims[0] }
+                               : this->spans[static_cast<std::size_t>(row)];
+  }
   void allocate(const std::array<int, 3>& n);
+  /** Restricts the domain to the spans; before the coefficients are written. */
+  void restrictTo(std::vector<Span> rowSpans);
   std::int64_t bytes() const;
 };
+
+/** body(row, begin of its values, their number) for each row of the domain, in parallel. */
+using RowBody = std::function<void(std::int64_t row, std::int64_t begin, int n)>;
+void ForEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, const RowBody& body);
+/** The sum of what the rows return, in an order that threads do not change. */
+using RowSum = std::function<double(std::int64_t row, std::int64_t begin, int n)>;
+double SumEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, const RowSum& row);
 
 /** Gives a voxel with neither face nor sink the sink `s`, so that nothing divides by zero. */
 void CloseIsolated(DiffusionOperator& A, float s, const ParallelFor& parallelFor);
@@ -77,6 +117,12 @@ public:
    */
   void cycle(const float* b, float* x, const ParallelFor& parallelFor);
 
+  /**
+   * Full multigrid: a better first guess than a cycle's, at the price of about one.
+   * From the coarsest grid up, each grid's cycle starts at the coarser one's answer.
+   */
+  void fullCycle(const float* b, float* x, const ParallelFor& parallelFor);
+
   /** Smoothing sweeps before and after each coarse correction; default 1. */
   int sweeps = 1;
 
@@ -93,8 +139,13 @@ private:
     std::array<Buffer<std::uint8_t>, 3> w; // weight of the parent's neighbour, /255
     Buffer<std::uint8_t> noWeight;         // a row of 0, along axes that are not halved
   };
-  void cycle(std::size_t l, const DiffusionOperator& A, const float* b, float* x,
-    const ParallelFor& parallelFor);
+  /** A cycle on level l; x is the start where `fromZero` is false. */
+  void cycle(
+    std::size_t l, const float* b, float* x, bool fromZero, const ParallelFor& parallelFor);
+  const DiffusionOperator& operatorOf(std::size_t l) const
+  {
+    return l == 0 ? *this->finest : this->levels[l].A;
+  }
   void coarsen(
     const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const;
 
