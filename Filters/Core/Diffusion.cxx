@@ -91,6 +91,18 @@ void applyDouble(const DoubleRow& row, double* LIGHTTRANSPORT_RESTRICT y)
   }
 }
 
+/** tau = step / diagonal, 0 where there is none. */
+void localSteps(const DoubleRow& row, double step, double* LIGHTTRANSPORT_RESTRICT tau)
+{
+  for (int i = 0; i < row.n; ++i)
+  {
+    const double diagonal = double(row.gx[i]) + (i > 0 ? double(row.gx[i - 1]) : 0.) +
+      double(row.gy[i]) + double(row.gyS[i]) + double(row.gz[i]) + double(row.gzB[i]) +
+      double(row.s[i]);
+    tau[i] = diagonal > 0. ? step / diagonal : 0.;
+  }
+}
+
 LIGHTTRANSPORT_SIMD
 void twoDots(std::int64_t n, const float* LIGHTTRANSPORT_RESTRICT a,
   const float* LIGHTTRANSPORT_RESTRICT b, const float* LIGHTTRANSPORT_RESTRICT c, double* sums)
@@ -1095,7 +1107,7 @@ DiffusionReport DiffusionSolver::solveSteady(
       }
     };
     darken(); // a start from elsewhere
-    RightHandSide<T> b{ q, 1. / this->scale, nullptr, 0., 0. };
+    RightHandSide<T> b{ q, 1. / this->scale };
     if (singular)
     {
       double sum = 0.;
@@ -1134,29 +1146,52 @@ DiffusionReport DiffusionSolver::stepImplicit(
   DiffusionReport report;
   const double began = now();
   const std::int64_t size = this->box.size();
-  const double shifted = 1. / (cdt * this->scale);
+  // SDIRK2 is two backward Euler steps of length gamma c dt, the second from where the slope of
+  // the first leads.
+  const int stages = control.implicitScheme == ImplicitScheme::SecondOrder ? 2 : 1;
+  const double gamma = stages == 2 ? 1. - std::sqrt(0.5) : 1.;
+  const double shifted = 1. / (gamma * cdt * this->scale);
   if (!std::isfinite(cdt) || !(cdt > 0.) || !std::isfinite(shifted) || shifted > 1e30)
   {
     report.message = "the time step c dt is not a positive length";
     return report;
   }
-  const RightHandSide<T> steady{ q, 1. / this->scale, nullptr, 0., 0. };
+  const RightHandSide<T> steady{ q, 1. / this->scale };
   const double qNorm = this->norm(steady);
   this->setShift(shifted);
   Buffer<double> previous(size);
   report.reason = StopReason::MaxIterations;
-  for (int step = 0; step < steps; ++step)
+  const std::int64_t solves = static_cast<std::int64_t>(stages) * steps;
+  DiffusionControl sharper = control;
+  for (std::int64_t solve = 0; solve < solves; ++solve)
   {
-    std::copy(phi, phi + size, previous.data());
-    const RightHandSide<T> b{ q, 1. / this->scale, previous.data(), shifted, 0. };
-    this->conjugateGradients(b, phi, control, static_cast<double>(step) / steps,
-      static_cast<double>(step + 1) / steps, report);
+    if (solve % stages == 0)
+    {
+      std::copy(phi, phi + size, previous.data());
+    }
+    else
+    {
+      const double ahead = (1. - gamma) / gamma;
+      for (std::int64_t i = 0; i < size; ++i)
+      {
+        previous[i] += ahead * (phi[i] - previous[i]);
+      }
+    }
+    const RightHandSide<T> b{ q, 1. / this->scale, 0., previous.data(), this->A.s.data(),
+      this->sinkWithoutShift.data() };
+    const double part = 1. / static_cast<double>(solves);
+    this->conjugateGradients(b, phi, sharper, static_cast<double>(solve) * part,
+      static_cast<double>(solve + 1) * part, report);
     if (report.reason != StopReason::Converged)
     {
       break;
     }
     report.reason = StopReason::MaxIterations;
-    // b - A phi of the steady equation is shift (phi - previous), up to this step's tolerance
+    if ((solve + 1) % stages != 0)
+    {
+      continue;
+    }
+    // b - A phi of the steady equation is shift (phi - previous), up to this solve's tolerance
     const double change = shifted *
       std::sqrt(SumRows(this->parallelFor, this->rows(), size,
         [&](std::int64_t r)
@@ -1170,8 +1205,18 @@ DiffusionReport DiffusionSolver::stepImplicit(
         }));
     if (change <= control.tolerance * qNorm)
     {
-      report.reason = StopReason::Converged;
-      break;
+      std::swap(this->A.s, this->sinkWithoutShift);
+      const double last = this->residual<T>(steady, phi, nullptr, 1.);
+      std::swap(this->A.s, this->sinkWithoutShift);
+      report.fineApplications += 1.;
+      if (last <= control.tolerance * qNorm)
+      {
+        report.reason = StopReason::Converged;
+        break;
+      }
+      // What is left is the solves' own error: |b| of a step may be far above |q|.
+      sharper.tolerance =
+        std::max(1e-14, sharper.tolerance * 0.3 * control.tolerance * qNorm / last);
     }
   }
   report.bytes += previous.bytes();
@@ -1188,13 +1233,10 @@ template <class T>
 DiffusionReport DiffusionSolver::stepExplicit(
   const T* q, double* phi, int steps, double cdt, const DiffusionControl& control)
 {
-  DiffusionReport report;
-  const double began = now();
-  const std::int64_t size = this->box.size();
-  const int nx = this->box.dims[0];
   // The margin is rounding's: the bound itself is allowed.
   if (!std::isfinite(cdt) || !(cdt > 0.) || cdt > this->stabilityBound() * (1. + 1e-6))
   {
+    DiffusionReport report;
     std::ostringstream text;
     text << "the explicit step c dt = " << cdt << " is unstable; expected in (0, "
          << this->stabilityBound() << "] (length; positive fields stay positive up to "
@@ -1202,15 +1244,47 @@ DiffusionReport DiffusionSolver::stepExplicit(
     report.message = text.str();
     return report;
   }
+  return this->march(q, phi, steps, cdt, false, control);
+}
+
+template <class T>
+DiffusionReport DiffusionSolver::stepLocal(
+  const T* q, double* phi, int steps, double courant, const DiffusionControl& control)
+{
+  DiffusionReport report;
+  if (!(courant > 0. && courant <= 1.))
+  {
+    std::ostringstream text;
+    text << "the fraction of the local step is " << courant << "; expected in (0, 1]";
+    report.message = text.str();
+    return report;
+  }
+  bool singular = false;
+  std::vector<std::uint8_t> reached;
+  if (q && !this->steadyStateExists(q, singular, reached, report))
+  {
+    return report;
+  }
+  return this->march(q, phi, steps, courant, true, control);
+}
+
+template <class T>
+DiffusionReport DiffusionSolver::march(
+  const T* q, double* phi, int steps, double length, bool local, const DiffusionControl& control)
+{
+  DiffusionReport report;
+  const double began = now();
+  const std::int64_t size = this->box.size();
+  const int nx = this->box.dims[0];
   this->setShift(0.);
-  const RightHandSide<T> b{ q, 1. / this->scale, nullptr, 0., 0. };
+  const RightHandSide<T> b{ q, 1. / this->scale };
   const double qNorm = this->norm(b);
   Buffer<double> other(size);
   report.bytes =
     this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
   double* from = phi;
   double* to = other.data();
-  const double step = cdt * this->scale;
+  const double step = local ? length : length * this->scale;
   report.reason = StopReason::MaxIterations;
   for (int i = 0; i < steps; ++i)
   {
@@ -1219,12 +1293,19 @@ DiffusionReport DiffusionSolver::stepExplicit(
       {
         double* LIGHTTRANSPORT_RESTRICT out = to + r * nx;
         const double* in = from + r * nx;
-        applyDouble(doubleRow(this->A, from, r, r * nx, nx), out);
+        const DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
+        applyDouble(row, out);
+        static thread_local std::vector<double> tau;
+        tau.assign(static_cast<std::size_t>(nx), step);
+        if (local)
+        {
+          localSteps(row, step, tau.data());
+        }
         double sum = 0.;
         for (int x = 0; x < nx; ++x)
         {
           const double v = b.at(r * nx + x) - out[x];
-          out[x] = in[x] + step * v;
+          out[x] = in[x] + tau[static_cast<std::size_t>(x)] * v;
           sum += v * v;
         }
         return sum;
@@ -1313,6 +1394,8 @@ void DiffusionSolver::flux(const double* phi, T* E) const
   template DiffusionReport DiffusionSolver::solveSteady<T>(                                        \
     const T*, double*, const DiffusionControl&);                                                   \
   template DiffusionReport DiffusionSolver::stepExplicit<T>(                                       \
+    const T*, double*, int, double, const DiffusionControl&);                                      \
+  template DiffusionReport DiffusionSolver::stepLocal<T>(                                          \
     const T*, double*, int, double, const DiffusionControl&);                                      \
   template DiffusionReport DiffusionSolver::stepImplicit<T>(                                       \
     const T*, double*, int, double, const DiffusionControl&);                                      \

@@ -103,10 +103,18 @@ struct DiffusionReport
 /** Called between iterations with a fraction done in [0, 1]; false cancels. */
 using DiffusionProgress = std::function<bool(double fraction)>;
 
+/** How implicit steps go forward. Both are L-stable: what a large step cannot follow, it damps. */
+enum class ImplicitScheme
+{
+  BackwardEuler, ///< first order, and positive for any step
+  SecondOrder    ///< SDIRK2 (Alexander 1977): two solves a step; large steps may undershoot
+};
+
 struct DiffusionControl
 {
   double tolerance = 1e-8;
   int maxIterations = 500;
+  ImplicitScheme implicitScheme = ImplicitScheme::BackwardEuler;
   DiffusionProgress progress; ///< may be empty; also called every 20 ms while a pass runs
   /**
    * Where above 0, the solve ends with Converged as soon as the estimated error (see
@@ -150,8 +158,8 @@ public:
 
   /**
    * Time steps of length c dt (a length > 0) from phi:
-   * forward Euler, whose positivity and stability bounds are below, or backward
-   * Euler (L-stable, positive for any step), each to `tolerance`. q may be null: none.
+   * forward Euler, whose positivity and stability bounds are below, or those of
+   * control.implicitScheme, each to `tolerance`. q may be null: none.
    * MaxIterations says that all steps were made, Converged that the steady state came first.
    */
   template <class T>
@@ -160,6 +168,16 @@ public:
   template <class T>
   DiffusionReport stepImplicit(
     const T* q, double* phi, int steps, double cdt, const DiffusionControl& control);
+
+  /**
+   * Explicit steps in which every voxel has its own c dt: the fraction `courant`, in (0, 1], of
+   * its own positivity bound, so that dense parts do not wait for clear ones. phi says nothing
+   * about time, but ends in the steady state: damped Jacobi. Stable and positive for any medium.
+   * (Murray 2018, sec. 4.1.3.) q and the report are as in stepExplicit.
+   */
+  template <class T>
+  DiffusionReport stepLocal(
+    const T* q, double* phi, int steps, double courant, const DiffusionControl& control);
 
   /** c dt up to which a forward Euler step keeps positive fields positive: 1 / max diagonal. */
   double positivityBound() const;
@@ -173,20 +191,27 @@ public:
   const Grid& grid() const { return this->box; }
 
 private:
-  /** b = qScale q + shift previous - mean, in the units of the scaled operator. */
+  /**
+   * b = qScale q + shift previous - mean, in the units of the scaled operator. The shift is
+   * the one that float sinks have taken up, so that implicit steps end in the steady state.
+   */
   template <class T>
   struct RightHandSide
   {
     const T* q;
     double qScale;
-    const double* previous;
-    double shift;
-    double mean;
+    double mean = 0.;
+    const double* previous = nullptr;
+    const float* shifted = nullptr;
+    const float* unshifted = nullptr;
 
     double at(std::int64_t i) const
     {
       return (this->q ? this->qScale * static_cast<double>(this->q[i]) - this->mean : 0.) +
-        (this->previous ? this->shift * this->previous[i] : 0.);
+        (this->previous
+            ? (static_cast<double>(this->shifted[i]) - static_cast<double>(this->unshifted[i])) *
+              this->previous[i]
+            : 0.);
     }
   };
   template <class T>
@@ -199,6 +224,10 @@ private:
   double norm(const RightHandSide<T>& b) const;
   template <class T>
   void balance(const T* q, const double* phi, DiffusionReport& report) const;
+  /** Of stepExplicit (c dt = step) and, where `local`, of stepLocal (step = courant). */
+  template <class T>
+  DiffusionReport march(
+    const T* q, double* phi, int steps, double step, bool local, const DiffusionControl& control);
   /**
    * False, with a message, where light has nowhere to go. singular: no voxel has a sink, and
    * phi is fixed up to a constant. reached: where walls may close parts off, a flag per voxel
