@@ -72,9 +72,10 @@ struct StrokeValues
   }
 };
 
-StrokeValues ValuesOf(vtkPolyData* strokes, const char* name, double constant)
+/** The values from the array of that name, or the constant; a message if it is too short. */
+std::string FindValues(
+  vtkPolyData* strokes, const char* name, double constant, StrokeValues& values)
 {
-  StrokeValues values;
   values.Constant = constant;
   vtkDataArray* array = name ? strokes->GetPointData()->GetArray(name) : nullptr;
   if (!array && name)
@@ -82,11 +83,21 @@ StrokeValues ValuesOf(vtkPolyData* strokes, const char* name, double constant)
     array = strokes->GetCellData()->GetArray(name);
     values.OnCells = array != nullptr;
   }
-  if (array)
+  if (!array)
   {
-    values.Read = vtkLightTransportImage::Reader(array, 0);
+    return {};
   }
-  return values;
+  values.Read = vtkLightTransportImage::Reader(array, 0);
+  const vtkIdType count =
+    values.OnCells ? strokes->GetNumberOfCells() : strokes->GetNumberOfPoints();
+  std::ostringstream text;
+  if (array->GetNumberOfTuples() != count)
+  {
+    text << "the array \"" << name << "\" of the strokes has " << array->GetNumberOfTuples()
+         << " tuples, expected " << count << ", one for each "
+         << (values.OnCells ? "cell" : "point");
+  }
+  return text.str();
 }
 
 /** An image source and the memory that it reads. */
@@ -327,6 +338,11 @@ std::string PrepareStrokes(vtkPolyData* strokes, const StrokeValues& radii,
       Stroke stroke;
       for (vtkIdType p = 0; p < n; ++p)
       {
+        if (ids[p] < 0 || ids[p] >= strokes->GetNumberOfPoints())
+        {
+          return "stroke " + std::to_string(cell) + " names point " + std::to_string(ids[p]) +
+            ", expected 0 to " + std::to_string(strokes->GetNumberOfPoints() - 1);
+        }
         std::array<double, 3> world;
         strokes->GetPoint(ids[p], world.data());
         const double radius = radii.at(ids[p], cell);
@@ -510,9 +526,17 @@ std::string vtkLightSeedFilter::Compute(vtkImageData* input, vtkImageData* paint
   // 3. Strokes.
   if (strokeCount > 0)
   {
-    problem =
-      PrepareStrokes(strokes, ValuesOf(strokes, this->RadiusArrayName, this->DefaultStrokeRadius),
-        ValuesOf(strokes, this->PowerArrayName, this->DefaultStrokePower), input, grid, spheres);
+    StrokeValues radii;
+    StrokeValues powers;
+    problem = FindValues(strokes, this->RadiusArrayName, this->DefaultStrokeRadius, radii);
+    if (problem.empty())
+    {
+      problem = FindValues(strokes, this->PowerArrayName, this->DefaultStrokePower, powers);
+    }
+    if (problem.empty())
+    {
+      problem = PrepareStrokes(strokes, radii, powers, input, grid, spheres);
+    }
     if (!problem.empty())
     {
       return problem;

@@ -35,6 +35,7 @@ namespace
 constexpr double LargestFloat = std::numeric_limits<float>::max();
 constexpr double SmallestFloat = std::numeric_limits<float>::min();
 constexpr double LongestTable = 65536.;
+constexpr double LongestDerivative = 32.; // smallest spacings; its cost grows with it
 
 /** The function's nodes outside [low, high], or none of them: a message, else nothing. */
 std::string FunctionProblem(vtkPiecewiseFunction* function, const char* name, const char* mapping,
@@ -317,6 +318,12 @@ std::string vtkOpticalMediumFilter::Compute(
   parameters.rational = this->GradientFunction == Rational;
   parameters.gradientScale = this->GradientScale;
   parameters.derivativeScale = this->DerivativeScale < 0. ? spacing : this->DerivativeScale;
+  if (parameters.derivativeScale > LongestDerivative * spacing)
+  {
+    text << "DerivativeScale is " << this->DerivativeScale << ", expected at most "
+         << LongestDerivative << " times the smallest spacing, " << spacing;
+    return text.str();
+  }
   parameters.ell = this->DiffusionLength > 0. ? this->DiffusionLength : spacing;
   parameters.betaFloor = this->BetaFloor;
   parameters.absorption = this->AbsorptionMapping == FromAlbedo ? AbsorptionRule::Albedo

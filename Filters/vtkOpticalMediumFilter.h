@@ -186,7 +186,7 @@ public:
    * Standard deviation, a length, of the Gaussian weights of the derivative.
    * Negative (the default, -1) means the smallest spacing of the axes that have
    * more than one point; 0 means plain central differences (one-sided at
-   * borders and walls). Finite.
+   * borders and walls). At most 32 of those spacings.
    */
   vtkSetMacro(DerivativeScale, double);
   vtkGetMacro(DerivativeScale, double);

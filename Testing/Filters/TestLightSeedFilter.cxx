@@ -520,6 +520,15 @@ void badInput(Suite& suite)
   LT_CHECK_FAILS(suite, filter, "stroke 0", "radius -2", ">= 0");
   filter->SetStrokesData(polyData({ inside, { { 0., Infinity, 0. } } }, 0));
   LT_CHECK_FAILS(suite, filter, "stroke 0", "point at 0 inf 0", "finite");
+  auto broken = polyData({ inside, world(image, 6., 3., 4.) }, 0);
+  addArray(broken->GetPointData(), "Radius", { 1. });
+  filter->SetStrokesData(broken);
+  LT_CHECK_FAILS(suite, filter, "\"Radius\"", "has 1 tuples", "expected 2");
+  broken->GetPointData()->RemoveArray("Radius");
+  const vtkIdType beyond[2] = { 0, 2 };
+  broken->GetLines()->InsertNextCell(2, beyond);
+  filter->Modified();
+  LT_CHECK_FAILS(suite, filter, "stroke 1 names point 2", "0 to 1");
   filter->SetStrokesData(nullptr);
   filter->SetDefaultStrokeRadius(-1.);
   LT_CHECK_FAILS(suite, filter, "DefaultStrokeRadius", ">= 0");

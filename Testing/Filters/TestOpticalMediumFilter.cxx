@@ -447,6 +447,8 @@ void badInput(Suite& suite)
     fails([&](double v) { filter->SetReach(v); }, bad, 0., "Reach", ">= 0");
   }
   fails([&](double v) { filter->SetDerivativeScale(v); }, NaN, -1., "DerivativeScale", "finite");
+  fails([&](double v) { filter->SetDerivativeScale(v); }, 33., 32., "DerivativeScale is 33",
+    "at most 32");
   fails([&](double v) { filter->SetDiffusionLength(v); }, 1e200, 0., "DiffusionLength", "float32");
   fails([&](double v) { filter->SetBetaFloor(v); }, 1e-300, 1e-6, "BetaFloor", "float32");
   fails([&](double v) { filter->SetReach(v); }, 1e-200, 0., "Reach", "float32");
