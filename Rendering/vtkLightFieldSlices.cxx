@@ -5,6 +5,7 @@
 #include "LightFieldLegend.h"
 #include "LightFieldSliceFrame.h"
 #include "LightFieldSliceImage.h"
+#include "LightFieldSliceLayout.h"
 
 #include "vtkActor.h"
 #include "vtkActor2D.h"
@@ -45,6 +46,7 @@
 #include <cstdio>
 #include <vector>
 
+using lighttransport::Box;
 using lighttransport::Dot;
 using lighttransport::SliceFrame;
 using lighttransport::Vector3;
@@ -54,129 +56,7 @@ vtkStandardNewMacro(vtkLightFieldSlices);
 namespace
 {
 constexpr int Slices = vtkLightFieldSlices::NumberOfSlices;
-
-/** A rectangle of the window in pixels. */
-struct Box
-{
-  int x = 0;
-  int y = 0;
-  int width = 0;
-  int height = 0;
-};
-
-/** Where the three slices and the legend go, at which scale (pixels per world length). */
-struct LayoutPlan
-{
-  double scale = 0.;
-  Box boxes[Slices + 1];
-};
-
-/** What a layout is planned for. */
-struct LayoutNeeds
-{
-  int width = 0;
-  int height = 0;
-  int legend = 0; // its width in pixels, or 0
-  int least = 1;  // no slice's box is smaller
-  double length[Slices][2] = {};
-};
-
 constexpr double LeastArrowPixels = 10.;
-constexpr int Gap = 2; // pixels, the background shows through
-
-/** The largest scale at which something fits that grows with the scale. */
-template <typename Fits>
-double LargestScale(double upper, const Fits& fits)
-{
-  double low = 0.;
-  double high = upper;
-  for (int n = 0; n < 60; ++n)
-  {
-    const double middle = 0.5 * (low + high);
-    (fits(middle) ? low : high) = middle;
-  }
-  return low;
-}
-
-double UpperScale(const LayoutNeeds& needs)
-{
-  double longest = 0.;
-  for (const auto& length : needs.length)
-  {
-    longest = std::max({ longest, length[0], length[1] });
-  }
-  return std::max(needs.width, needs.height) / longest;
-}
-
-LayoutPlan PlanRow(const LayoutNeeds& needs)
-{
-  const double available = needs.width - needs.legend - 2. * Gap;
-  const auto widthOf = [&](int slice, double scale)
-  { return std::max<double>(needs.least, scale * needs.length[slice][0]); };
-  LayoutPlan plan;
-  plan.scale = LargestScale(UpperScale(needs),
-    [&](double scale)
-    {
-      double width = 0.;
-      double height = 0.;
-      for (int slice = 0; slice < Slices; ++slice)
-      {
-        width += widthOf(slice, scale);
-        height = std::max(height, scale * needs.length[slice][1]);
-      }
-      return width <= available && height <= needs.height;
-    });
-  double rest = available;
-  for (int slice = 0; slice < Slices; ++slice)
-  {
-    rest -= widthOf(slice, plan.scale);
-  }
-  double x = 0.;
-  for (int slice = 0; slice < Slices; ++slice)
-  {
-    const double width = widthOf(slice, plan.scale) + std::max(0., rest) / Slices;
-    const int left = static_cast<int>(std::lround(x));
-    const int right = static_cast<int>(std::lround(x + width));
-    plan.boxes[slice] = { left, 0, right - left, needs.height };
-    x += width + Gap;
-  }
-  plan.boxes[Slices] = { needs.width - needs.legend, 0, needs.legend, needs.height };
-  return plan;
-}
-
-LayoutPlan PlanGrid(const LayoutNeeds& needs)
-{
-  const auto& length = needs.length;
-  const double least = needs.least;
-  const auto leftWidth = [&](double scale)
-  { return std::max(least, scale * std::max(length[0][0], length[1][0])); };
-  const auto rightWidth = [&](double scale) {
-    return std::max({ least, scale * length[2][0], static_cast<double>(needs.legend) });
-  };
-  const auto topHeight = [&](double scale) { return std::max(least, scale * length[0][1]); };
-  const auto bottomHeight = [&](double scale)
-  { return std::max(least, scale * std::max(length[1][1], length[2][1])); };
-  LayoutPlan plan;
-  plan.scale = LargestScale(UpperScale(needs),
-    [&](double scale)
-    {
-      return leftWidth(scale) + rightWidth(scale) + Gap <= needs.width &&
-        topHeight(scale) + bottomHeight(scale) + Gap <= needs.height;
-    });
-  const double restX =
-    std::max(0., needs.width - Gap - leftWidth(plan.scale) - rightWidth(plan.scale));
-  const double restY =
-    std::max(0., needs.height - Gap - topHeight(plan.scale) - bottomHeight(plan.scale));
-  const int left = static_cast<int>(std::lround(leftWidth(plan.scale) + 0.5 * restX));
-  const int bottom = static_cast<int>(std::lround(bottomHeight(plan.scale) + 0.5 * restY));
-  const int x = left + Gap;
-  const int y = bottom + Gap;
-  plan.boxes[vtkLightFieldSlices::Axial] = { 0, y, left, needs.height - y };
-  plan.boxes[vtkLightFieldSlices::Coronal] = { 0, 0, left, bottom };
-  plan.boxes[vtkLightFieldSlices::Sagittal] = { x, 0, needs.width - x, bottom };
-  plan.boxes[Slices] = { x, y, needs.width - x, needs.height - y };
-  return plan;
-}
 
 /** The extremes of a field and where they are; finite values only. */
 struct FieldExtremes
@@ -241,6 +121,47 @@ void SetUpText(vtkTextActor* text, int fontSize)
   look->SetBackgroundColor(0., 0., 0.);
   look->SetBackgroundOpacity(0.6);
 }
+
+/** What is upstream of a port. One that failed, and said why, runs again when it has changed. */
+struct Pipeline
+{
+  vtkWeakPointer<vtkAlgorithm> producer;
+  vtkMTimeType time = 0;
+  bool failed = false;
+
+  void Update(vtkAlgorithm* newProducer, int output)
+  {
+    auto* executive = vtkStreamingDemandDrivenPipeline::SafeDownCast(newProducer->GetExecutive());
+    if (!executive)
+    {
+      newProducer->Update(output);
+      this->failed = false;
+      return;
+    }
+    const bool same = this->producer == newProducer && this->failed;
+    this->producer = newProducer;
+    executive->UpdateDataObject();
+    executive->UpdatePipelineMTime();
+    if (same && executive->GetPipelineMTime() == this->time)
+    {
+      return;
+    }
+    this->time = executive->GetPipelineMTime();
+    this->failed = !executive->UpdateInformation();
+    if (this->failed)
+    {
+      return;
+    }
+    // The whole extent: another consumer may have asked for a part.
+    vtkInformation* info = executive->GetOutputInformation(output);
+    if (info && info->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()))
+    {
+      info->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(),
+        info->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()), 6);
+    }
+    this->failed = !executive->Update(output);
+  }
+};
 
 /** A prop of lines and faces in one colour, unlit. */
 struct FlatActor
@@ -379,14 +300,17 @@ public:
     vtkMTimeType anatomyTime = 0;
     vtkImageData* light = nullptr;
     vtkMTimeType lightTime = 0;
+    bool failed[2] = { false, false };
     bool operator==(const BuildKey& o) const
     {
       return this->self == o.self && this->anatomy == o.anatomy &&
         this->anatomyTime == o.anatomyTime && this->light == o.light &&
-        this->lightTime == o.lightTime;
+        this->lightTime == o.lightTime && this->failed[0] == o.failed[0] &&
+        this->failed[1] == o.failed[1];
     }
   };
   BuildKey Built;
+  Pipeline Upstream[2];
   /** Extremes cost a pass over the field: kept while the field is the same. */
   FieldExtremes FluenceExtremes;
   FieldExtremes FluxExtremes;
@@ -507,6 +431,10 @@ std::string vtkLightFieldSlices::vtkInternals::CheckField(
 bool vtkLightFieldSlices::vtkInternals::Build(
   vtkLightFieldSlices* self, vtkImageData* anatomy, vtkImageData* light)
 {
+  if (this->Upstream[0].failed)
+  {
+    return false; // upstream has said why
+  }
   lighttransport::AnatomyLook anatomyLook;
   std::string problem = CheckChoice("PatientAxes", self->PatientAxes, LPS);
   problem += CheckChoice("Convention", self->Convention, Neurological);
@@ -529,7 +457,7 @@ bool vtkLightFieldSlices::vtkInternals::Build(
   const bool showsFlux = this->Property->GetMode() == vtkLightFieldProperty::FluxDirection;
   vtkDataArray* fluence = nullptr;
   vtkDataArray* flux = nullptr;
-  if (self->GetNumberOfInputConnections(1) > 0)
+  if (self->GetNumberOfInputConnections(1) > 0 && !this->Upstream[1].failed)
   {
     if (!showsFlux)
     {
@@ -732,7 +660,7 @@ void vtkLightFieldSlices::vtkInternals::Arrange(vtkLightFieldSlices* self, vtkRe
   const int* size = window->GetActualSize();
   const int left = static_cast<int>(std::lround(this->Rectangle[0] * size[0]));
   const int bottom = static_cast<int>(std::lround(this->Rectangle[1] * size[1]));
-  LayoutNeeds needs;
+  lighttransport::LayoutNeeds needs;
   needs.width = std::max(1, static_cast<int>(std::lround(this->Rectangle[2] * size[0])) - left);
   needs.height = std::max(1, static_cast<int>(std::lround(this->Rectangle[3] * size[1])) - bottom);
   const int fontSize = std::min(18,
@@ -747,9 +675,9 @@ void vtkLightFieldSlices::vtkInternals::Arrange(vtkLightFieldSlices* self, vtkRe
   {
     std::copy_n(this->Panels[slice].frame.length, 2, needs.length[slice]);
   }
-  const LayoutPlan row = PlanRow(needs);
-  const LayoutPlan grid = PlanGrid(needs);
-  const LayoutPlan& plan =
+  const lighttransport::LayoutPlan row = lighttransport::PlanRow(needs);
+  const lighttransport::LayoutPlan grid = lighttransport::PlanGrid(needs);
+  const lighttransport::LayoutPlan& plan =
     self->Layout == Row || (self->Layout != Grid && row.scale >= grid.scale) ? row : grid;
   this->Scale = plan.scale * self->Zoom;
   if (this->Arrows.flux)
@@ -1080,30 +1008,20 @@ void vtkLightFieldSlices::ClearWindowLevel()
 //------------------------------------------------------------------------------
 void vtkLightFieldSlices::Update()
 {
-  // Both pipelines, whole extents: another consumer may have asked for a part.
-  for (int port = 0; port < 2; ++port)
-  {
-    if (this->GetNumberOfInputConnections(port) > 0)
-    {
-      int output = 0;
-      vtkAlgorithm* producer = this->GetInputAlgorithm(port, 0, output);
-      producer->UpdateInformation();
-      vtkInformation* info = producer->GetOutputInformation(output);
-      if (info && info->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()))
-      {
-        info->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(),
-          info->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()), 6);
-      }
-      producer->Update(output);
-    }
-  }
   vtkInternals& internals = *this->Internals;
   vtkImageData* images[2] = { nullptr, nullptr };
   for (int port = 0; port < 2; ++port)
   {
     if (this->GetNumberOfInputConnections(port) > 0)
     {
+      int output = 0;
+      vtkAlgorithm* producer = this->GetInputAlgorithm(port, 0, output);
+      internals.Upstream[port].Update(producer, output);
       images[port] = vtkImageData::SafeDownCast(this->GetInputDataObject(port, 0));
+    }
+    else
+    {
+      internals.Upstream[port] = Pipeline();
     }
   }
   vtkInternals::BuildKey key;
@@ -1112,6 +1030,8 @@ void vtkLightFieldSlices::Update()
   key.anatomyTime = images[0] ? images[0]->GetMTime() : 0;
   key.light = images[1];
   key.lightTime = images[1] ? images[1]->GetMTime() : 0;
+  key.failed[0] = internals.Upstream[0].failed;
+  key.failed[1] = internals.Upstream[1].failed;
   if (!(key == internals.Built))
   {
     internals.Valid = internals.Build(this, images[0], images[1]);

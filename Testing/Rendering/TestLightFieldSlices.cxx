@@ -10,16 +10,21 @@
 
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
+#include "vtkExecutive.h"
 #include "vtkFloatArray.h"
-#include "vtkImageCast.h"
+#include "vtkImageAlgorithm.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
 #include "vtkLightFieldProperty.h"
 #include "vtkLightFieldSlices.h"
 #include "vtkMath.h"
 #include "vtkMatrix3x3.h"
+#include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkRenderer.h"
 #include "vtkRendererCollection.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkTestErrorObserver.h"
 #include "vtkTrivialProducer.h"
 #include "vtkUnsignedCharArray.h"
@@ -666,6 +671,15 @@ void testCorners(Suite& suite)
     LT_CHECK_NEAR(suite, middle[0], 255. * (0.5 + rgba[3] * (rgba[0] - 0.5)), 1.01);
   }
 
+  // Windows of few pixels.
+  for (const auto& size : { std::array<int, 2>{ 1, 1 }, std::array<int, 2>{ 7, 5 },
+         std::array<int, 2>{ 150, 3 }, std::array<int, 2>{ 150, 150 } })
+  {
+    window->SetSize(size[0], size[1]);
+    window->Render();
+    LT_CHECK(suite, openGLErrors().empty() && !errors->GetError());
+  }
+
   // NaN in the anatomy is black, and spoils neither neighbours nor the window.
   const double nan = std::numeric_limits<double>::quiet_NaN();
   Image holed = makeImage(RASAxes, { 16, 16, 16 }, { 1., 1., 1. });
@@ -728,6 +742,38 @@ void checkError(Suite& suite, vtkRenderWindow* window, vtkTest::ErrorObserver* e
   suite.check(!errors->GetError(), "told twice: " + subject, __FILE__, line);
 }
 
+/** A light field whose making can fail. */
+class FailingSource : public vtkImageAlgorithm
+{
+public:
+  static FailingSource* New();
+  vtkTypeMacro(FailingSource, vtkImageAlgorithm);
+  bool Fails = true;
+  int Runs = 0;
+
+protected:
+  FailingSource() { this->SetNumberOfInputPorts(0); }
+  int RequestInformation(
+    vtkInformation*, vtkInformationVector**, vtkInformationVector* out) override
+  {
+    out->GetInformationObject(0)->Set(
+      vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), makeLight(RASAxes)->GetExtent(), 6);
+    return 1;
+  }
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* out) override
+  {
+    ++this->Runs;
+    if (this->Fails)
+    {
+      vtkErrorMacro("This always fails.");
+      return 0;
+    }
+    vtkImageData::GetData(out)->ShallowCopy(makeLight(RASAxes));
+    return 1;
+  }
+};
+vtkStandardNewMacro(FailingSource);
+
 void testErrors(Suite& suite)
 {
   vtkNew<vtkRenderWindow> window;
@@ -773,6 +819,27 @@ void testErrors(Suite& suite)
   checkError(suite, window, errors, "Flux is missing", __LINE__);
   LT_CHECK(suite, coloredQuarters(slices->GetSliceImage(0)).share[1][1] > 0.1); // the fluence
   slices->ShowArrowsOff();
+
+  // A pipeline that fails has said why: it is not asked again until it changes,
+  // and the slices add nothing.
+  vtkNew<FailingSource> failing;
+  failing->AddObserver(vtkCommand::ErrorEvent, errors);
+  failing->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, errors);
+  vtkNew<vtkTest::ErrorObserver> own;
+  slices->AddObserver(vtkCommand::ErrorEvent, own);
+  slices->SetLightFieldConnection(failing->GetOutputPort());
+  window->Render();
+  window->Render();
+  LT_CHECK(suite, failing->Runs == 1 && !own->GetError());
+  LT_CHECK(suite, coloredQuarters(slices->GetSliceImage(0)).share[1][1] == 0.);
+  failing->Modified();
+  window->Render();
+  LT_CHECK(suite, failing->Runs == 2);
+  failing->Fails = false;
+  failing->Modified();
+  window->Render();
+  LT_CHECK(suite, failing->Runs == 3 && !own->GetError());
+  LT_CHECK(suite, coloredQuarters(slices->GetSliceImage(0)).share[1][1] > 0.1);
 
   // Setters.
   errors->Clear();
