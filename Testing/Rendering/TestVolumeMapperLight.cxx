@@ -301,7 +301,7 @@ void testPrecision(Suite& suite)
   setFluence<vtkDoubleArray>(image, phi);
   scene.mapper->SetLightFieldData(image);
   const Picture reference = scene.capture();
-  writePicture(suite, reference, "TestVolumeMapperLight-precision");
+  writePicture(suite, reference, "VolumeMapperPrecision");
   LT_CHECK(suite, regionMean(reference, 0, 0, 63, 63)[0] > 5.);
   for (const double power : { 1e-30, 1e30, 1e-200, 1e200 })
   {

@@ -457,7 +457,7 @@ void testViews(Suite& suite)
   left->SetActiveCamera(nullptr);
   left->ResetCamera();
   auto observer2 = observe(secondMapper);
-  writePicture(suite, capture(window), "TestVolumeMapperStock-two");
+  writePicture(suite, capture(window), "VolumeMapperTwo");
   LT_CHECK(suite, observer->errors.empty() && observer2->errors.empty());
 
   // Another window takes the mapper over; resources of the first are given back.
@@ -503,7 +503,7 @@ void testWithOthers(Suite& suite)
   scene.renderer->SetUseDepthPeelingForVolumes(true);
   scene.renderer->SetMaximumNumberOfPeels(8);
   const Picture peeled = scene.capture();
-  writePicture(suite, peeled, "TestVolumeMapperStock-peeled");
+  writePicture(suite, peeled, "VolumeMapperPeeled");
   const Color middle = pixel(peeled, 32, 32);
   LT_CHECK(suite, middle[0] > 40. && middle[1] > 20.);
   LT_CHECK(suite, observer->all().empty());
