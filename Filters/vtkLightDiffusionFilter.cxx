@@ -3,6 +3,7 @@
 #include "vtkLightDiffusionFilter.h"
 
 #include "Core/Diffusion.h"
+#include "Core/FirstMoment.h"
 #include "vtkLightTransportArrays.h"
 #include "vtkLightTransportInternal.h"
 #include "vtkOpticalMediumFilter.h"
@@ -54,6 +55,7 @@ struct MediumKey
   double spacing[3] = { 0., 0., 0. };
   int boundary = -1;
   double refractiveIndexRatio = 0.;
+  bool moment = false; // for the first-moment solver
 
   void setArray(int i, vtkDataArray* array)
   {
@@ -70,7 +72,7 @@ struct MediumKey
         return false;
       }
     }
-    return this->boundary == other.boundary &&
+    return this->boundary == other.boundary && this->moment == other.moment &&
       this->refractiveIndexRatio == other.refractiveIndexRatio;
   }
 };
@@ -100,6 +102,7 @@ struct vtkLightDiffusionFilter::State
   }
 
   lighttransport::DiffusionSolver solver;
+  std::unique_ptr<lighttransport::FirstMomentSolver> moment; // where the model is FirstMoment
   MediumKey key;
   bool valid = false;                 // the solver's operator is that of the key
   lighttransport::Buffer<double> phi; // the last state, where Continue asks for it
@@ -178,9 +181,10 @@ void vtkLightDiffusionFilter::ClearReport()
 bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
 {
   std::ostringstream text;
-  if (this->Model != Diffusion && this->Model != AnisotropicDiffusion)
+  if (this->Model != Diffusion && this->Model != AnisotropicDiffusion && this->Model != FirstMoment)
   {
-    text << "Model is " << this->Model << "; expected Diffusion or AnisotropicDiffusion";
+    text << "Model is " << this->Model
+         << "; expected Diffusion, AnisotropicDiffusion or FirstMoment";
   }
   else if (this->Mode != Steady && this->Mode != Explicit && this->Mode != Implicit)
   {
@@ -190,6 +194,25 @@ bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
   {
     text << "Mode is Steady with the model AnisotropicDiffusion, which has no absorption and ends "
             "in a constant; expected Explicit or Implicit with a bounded NumberOfSteps";
+  }
+  else if (this->Model == FirstMoment && this->Mode == Implicit)
+  {
+    text << "Mode is Implicit with the model FirstMoment; expected Explicit, or Steady";
+  }
+  else if (this->LocalTimeStep && this->Mode == Explicit &&
+    (this->Model != Diffusion || this->TimeStep != 0. || this->CourantNumber > 1.))
+  {
+    text << "LocalTimeStep is on with the model "
+         << (this->Model == FirstMoment
+                ? "FirstMoment"
+                : (this->Model == Diffusion ? "Diffusion" : "AnisotropicDiffusion"))
+         << ", TimeStep " << this->TimeStep << " and CourantNumber " << this->CourantNumber
+         << "; expected Diffusion, 0 and a number in (0, 1]";
+  }
+  else if (this->ImplicitScheme != BackwardEuler && this->ImplicitScheme != SecondOrder)
+  {
+    text << "ImplicitScheme is " << this->ImplicitScheme
+         << "; expected BackwardEuler or SecondOrder";
   }
   else if (this->Boundary != Robin && this->Boundary != ZeroFlux && this->Boundary != Absorbing)
   {
@@ -308,6 +331,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
   }
   const bool anisotropic = this->Model == AnisotropicDiffusion;
+  const bool moment = this->Model == FirstMoment && this->Mode == Explicit;
   const auto find = [&](vtkImageData* image, const char* name) -> vtkDataArray*
   {
     vtkDataArray* array = image->GetPointData()->GetArray(name);
@@ -477,11 +501,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   std::copy(spacing, spacing + 3, key.spacing);
   key.boundary = this->Boundary;
   key.refractiveIndexRatio = this->RefractiveIndexRatio;
+  key.moment = moment;
   double setupSeconds = 0.;
   if (!kept.valid || !(key == kept.key))
   {
     kept.valid = false;
     kept.phi.release();
+    kept.moment.reset(
+      moment ? new lighttransport::FirstMomentSolver(vtkLightTransportParallelFor()) : nullptr);
     const auto build = [&](auto zero, const auto* d, const auto* s)
     {
       lighttransport::DiffusionMedium<decltype(zero)> medium;
@@ -492,7 +519,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       medium.outside = outside.empty() ? nullptr : outside.data();
       medium.boundary = static_cast<lighttransport::Boundary>(this->Boundary);
       medium.refractiveIndexRatio = this->RefractiveIndexRatio;
-      return kept.solver.setMedium(medium);
+      return moment ? kept.moment->setMedium(medium) : kept.solver.setMedium(medium);
     };
     DiffusionReport report;
     if (D->GetDataType() == VTK_FLOAT && (!sigma_a || sigma_a->GetDataType() == VTK_FLOAT))
@@ -517,8 +544,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     kept.key = key;
     kept.valid = true;
   }
-  this->PositivityBound = kept.solver.positivityBound();
-  this->StabilityBound = kept.solver.stabilityBound();
+  this->PositivityBound = moment ? 0. : kept.solver.positivityBound();
+  this->StabilityBound = moment ? kept.moment->stabilityBound() : kept.solver.stabilityBound();
 
   // 3. solve
   lighttransport::Buffer<double> phi;
@@ -529,6 +556,10 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   else
   {
     phi.allocate(size);
+    if (moment)
+    {
+      kept.moment->reset();
+    }
     if (anisotropic)
     {
       for (vtkIdType i = 0; i < size; ++i)
@@ -541,16 +572,30 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   lighttransport::DiffusionControl control;
   control.tolerance = this->Tolerance;
   control.maxIterations = this->MaximumNumberOfIterations;
+  control.implicitScheme = static_cast<lighttransport::ImplicitScheme>(this->ImplicitScheme);
   control.progress = [this](double fraction)
   {
     this->UpdateProgress(fraction);
     return !this->GetAbortExecute();
   };
-  this->UsedTimeStep = this->Mode == Steady ? 0.
-    : this->TimeStep > 0.                   ? this->TimeStep
-                                            : this->CourantNumber * this->PositivityBound;
-  const auto solve = [&](const auto* q)
+  const bool local = this->LocalTimeStep && this->Mode == Explicit;
+  const double bound = moment ? kept.moment->courantBound() : this->PositivityBound;
+  this->UsedTimeStep = this->Mode == Steady || local ? 0.
+    : this->TimeStep > 0.                            ? this->TimeStep
+                                                     : this->CourantNumber * bound;
+  lighttransport::FirstMomentReport energies;
+  const auto solve = [&](const auto* q) -> DiffusionReport
   {
+    if (moment)
+    {
+      energies = kept.moment->step(q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
+      return energies;
+    }
+    if (local)
+    {
+      return kept.solver.stepLocal(
+        q, phi.data(), this->NumberOfSteps, this->CourantNumber, control);
+    }
     switch (this->Mode)
     {
       case Explicit:
@@ -644,7 +689,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       array->SetNumberOfComponents(3);
       array->SetNumberOfTuples(size);
       auto* E = array->GetPointer(0);
-      kept.solver.flux(phi.data(), E);
+      if (moment)
+      {
+        kept.moment->flux(phi.data(), E);
+      }
+      else
+      {
+        kept.solver.flux(phi.data(), E);
+      }
       vtkMatrix3x3* direction = input->GetDirectionMatrix();
       if (!direction->IsIdentity())
       {
@@ -674,6 +726,21 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
   output->GetPointData()->SetActiveScalars(names::Fluence);
   this->WriteReport(output);
+  if (moment)
+  {
+    // over this execution, as energy times c; emitted = absorbed + escaped + stored
+    const auto number = [output](const char* name, double value)
+    {
+      vtkNew<vtkDoubleArray> array;
+      array->SetName(name);
+      array->InsertNextValue(value);
+      output->GetFieldData()->AddArray(array);
+    };
+    number("LightDiffusionReport.EmittedEnergy", energies.emittedEnergy);
+    number("LightDiffusionReport.AbsorbedEnergy", energies.absorbedEnergy);
+    number("LightDiffusionReport.EscapedEnergy", energies.escapedEnergy);
+    number("LightDiffusionReport.StoredEnergy", energies.storedEnergy);
+  }
   if (this->Continue)
   {
     kept.phi = std::move(phi);
@@ -700,7 +767,7 @@ void vtkLightDiffusionFilter::WriteReport(vtkImageData* output) const
     array->InsertNextValue(value);
     field->AddArray(array);
   };
-  static const char* const models[] = { "Diffusion", "AnisotropicDiffusion" };
+  static const char* const models[] = { "Diffusion", "AnisotropicDiffusion", "FirstMoment" };
   static const char* const modes[] = { "Steady", "Explicit", "Implicit" };
   static const char* const boundaries[] = { "Robin", "ZeroFlux", "Absorbing" };
   word("Model", models[this->Model]);
@@ -709,6 +776,11 @@ void vtkLightDiffusionFilter::WriteReport(vtkImageData* output) const
   number("RefractiveIndexRatio", this->RefractiveIndexRatio);
   number("Tolerance", this->Tolerance);
   number("TimeStep", this->UsedTimeStep);
+  number("LocalTimeStep", this->LocalTimeStep && this->Mode == Explicit ? 1. : 0.);
+  if (this->Mode == Implicit)
+  {
+    word("ImplicitScheme", this->ImplicitScheme == SecondOrder ? "SecondOrder" : "BackwardEuler");
+  }
   word("StopReason", this->GetStopReasonAsString());
   word("Message", this->Message.c_str());
   number("Iterations", this->NumberOfIterationsUsed);
@@ -739,6 +811,8 @@ void vtkLightDiffusionFilter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "NumberOfSteps: " << this->NumberOfSteps << "\n";
   os << indent << "CourantNumber: " << this->CourantNumber << "\n";
   os << indent << "TimeStep: " << this->TimeStep << "\n";
+  os << indent << "LocalTimeStep: " << this->LocalTimeStep << "\n";
+  os << indent << "ImplicitScheme: " << this->ImplicitScheme << "\n";
   os << indent << "FluxFunction: " << this->FluxFunction << "\n";
   os << indent << "GradientScale: " << this->GradientScale << "\n";
   os << indent << "ComputedGradientScale: " << this->ComputedGradientScale << "\n";

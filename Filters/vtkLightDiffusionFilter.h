@@ -33,7 +33,7 @@
  *   3. solve: Steady by conjugate gradients with one multigrid cycle as
  *      preconditioner, until the residual, recomputed in double precision, is below
  *      the tolerance; or time steps, Explicit (forward Euler) or Implicit (backward
- *      Euler, L-stable), from phi = 0 or from the last state;
+ *      Euler or SDIRK2, both L-stable), from phi = 0 or from the last state;
  *   4. write the arrays, and the report into getters and field data
  *      (`LightDiffusionReport.*`), so that a saved file says how it was made.
  *
@@ -41,6 +41,16 @@
  * (Murray 2018, sec. 3.1.3): Source is the field at time 0 and is smoothed
  * without absorption by D = length * C(|grad S|), C from the input's scalars S (never
  * from phi), for a bounded number of steps. Fluence then has Source's unit.
+ *
+ * Model FirstMoment lets light travel: diffusion is at once everywhere, while the system of
+ * fluence and flux that it comes from (the thesis's eq. 3.23 and 3.24),
+ *
+ *   (1/c) d(phi)/dt = -div E - sigma_a phi + q
+ *   (1/c) dE/dt     = -(1/3) grad phi - E / (3 D),
+ *
+ * has fronts that move at c / sqrt(3), and ends in the same steady state. On a staggered grid
+ * (phi on the points, E between them) it has none of the grid patterns for which the thesis
+ * gave it up. Behind a front that spreads, phi may be negative: so it is in the exact solution.
  *
  * Murray, D.: Legible Visualization of Semi-Transparent Objects using Light
  * Transport. PhD thesis, Bordeaux 2018, ch. 3 and 4 (eq. 4.3 and 4.4 there have
@@ -73,10 +83,14 @@ public:
   enum ModelType
   {
     Diffusion = 0,
-    AnisotropicDiffusion = 1
+    AnisotropicDiffusion = 1,
+    FirstMoment = 2
   };
   ///@{
-  /** What moves the light; default Diffusion. */
+  /**
+   * What moves the light; default Diffusion. FirstMoment differs from it in Mode Explicit alone:
+   * its Steady is the same, and Implicit is an error.
+   */
   vtkSetMacro(Model, int);
   vtkGetMacro(Model, int);
   ///@}
@@ -149,7 +163,9 @@ public:
   /**
    * The step c dt as a fraction of the positivity bound that is computed from the data
    * (GetPositivityBound). Above 0; default 1. Explicit: above the stability bound (between 1
-   * and 2 times that) the execution is refused. Implicit: any; 1000 is fast.
+   * and 2 times that) the execution is refused. Implicit: any; 1000 is fast. FirstMoment: as a
+   * fraction of sqrt(3 / sum 1/h^2), the c dt in which light goes as far as a step can carry it;
+   * stable up to 1 in any medium.
    */
   vtkSetMacro(CourantNumber, double);
   vtkGetMacro(CourantNumber, double);
@@ -159,6 +175,34 @@ public:
   /** The step c dt itself, a length; >= 0, default 0: from CourantNumber. */
   vtkSetMacro(TimeStep, double);
   vtkGetMacro(TimeStep, double);
+  ///@}
+
+  ///@{
+  /**
+   * Explicit steps of Diffusion in which each point has its own c dt, CourantNumber (here at most
+   * 1) times its own positivity bound, so that dense parts need not wait for clear ones. Reaches
+   * only the steady state, where contrast is high many times sooner: the fields on the way belong
+   * to no time (Murray 2018, sec. 4.1.3: "clearly not realistic"). TimeStep must be 0. Default
+   * off; Steady and Implicit ignore it.
+   */
+  vtkSetMacro(LocalTimeStep, bool);
+  vtkGetMacro(LocalTimeStep, bool);
+  vtkBooleanMacro(LocalTimeStep, bool);
+  ///@}
+
+  enum ImplicitSchemeType
+  {
+    BackwardEuler = 0,
+    SecondOrder = 1
+  };
+  ///@{
+  /**
+   * How Implicit steps. BackwardEuler (default): first order in time, positive for any step.
+   * SecondOrder: SDIRK2 (Alexander 1977), two solves a step; steps far above the positivity bound
+   * may undershoot for a while. Both are L-stable: what a large step cannot follow, it damps.
+   */
+  vtkSetMacro(ImplicitScheme, int);
+  vtkGetMacro(ImplicitScheme, int);
   ///@}
 
   enum FluxFunctionType
@@ -254,10 +298,11 @@ public:
   ///@}
   ///@{
   /** Of the medium of the last execution, c dt as a length: up to which an explicit step keeps
-   * positive fields positive, and up to which it is stable (Gershgorin). */
+   * positive fields positive (0 with FirstMoment, which keeps no sign), and up to which it is
+   * stable (Gershgorin). */
   vtkGetMacro(PositivityBound, double);
   vtkGetMacro(StabilityBound, double);
-  /** The c dt that was used. */
+  /** The c dt that was used; 0 where each point has its own. */
   vtkGetMacro(UsedTimeStep, double);
   ///@}
 
@@ -291,6 +336,8 @@ private:
   int NumberOfSteps = 100;
   double CourantNumber = 1.;
   double TimeStep = 0.;
+  bool LocalTimeStep = false;
+  int ImplicitScheme = BackwardEuler;
   int FluxFunction = Exponential;
   double GradientScale = 0.;
   double ComputedGradientScale = 0.;
