@@ -753,7 +753,7 @@ void TestVdb(Suite& suite, const std::string& folder)
   Save(folder + "text.vdb", "no VDB");
   CHECK_ERROR(folder + "text.vdb", "cannot read", "text.vdb");
   Bytes cut = ReadBytes(folder + "trip.vdb");
-  cut.resize(cut.size() / 2);
+  cut.resize(150); // further on, OpenVDB itself leaks what it has read
   Save(folder + "cut.vdb", cut);
   CHECK_ERROR(folder + "cut.vdb", "cannot read", "cut.vdb");
 }
