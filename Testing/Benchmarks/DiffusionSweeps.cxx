@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "DiffusionSweeps.h"
+
+#include "Core/Kernel.h"
+
+#include <chrono>
+
+namespace lighttransport
+{
+namespace benchmark
+{
+namespace
+{
+LIGHTTRANSPORT_SIMD
+void triad(std::int64_t n, double* LIGHTTRANSPORT_RESTRICT a,
+  const double* LIGHTTRANSPORT_RESTRICT b, const double* LIGHTTRANSPORT_RESTRICT c)
+{
+  for (std::int64_t i = 0; i < n; ++i)
+  {
+    a[i] = b[i] + 3. * c[i];
+  }
+}
+
+struct JacobiRow
+{
+  const float *gx, *gy, *gyS, *gz, *gzB, *inverse, *q;
+  const float *x, *xS, *xN, *xB, *xT;
+};
+
+LIGHTTRANSPORT_SIMD
+void jacobi(int n, const JacobiRow& row, float* LIGHTTRANSPORT_RESTRICT out)
+{
+  const float* LIGHTTRANSPORT_RESTRICT gx = row.gx;
+  const float* LIGHTTRANSPORT_RESTRICT gy = row.gy;
+  const float* LIGHTTRANSPORT_RESTRICT gyS = row.gyS;
+  const float* LIGHTTRANSPORT_RESTRICT gz = row.gz;
+  const float* LIGHTTRANSPORT_RESTRICT gzB = row.gzB;
+  const float* LIGHTTRANSPORT_RESTRICT inverse = row.inverse;
+  const float* LIGHTTRANSPORT_RESTRICT q = row.q;
+  const float *x = row.x, *xS = row.xS, *xN = row.xN, *xB = row.xB, *xT = row.xT;
+  const auto others = [&](int i)
+  { return q[i] + gy[i] * xN[i] + gyS[i] * xS[i] + gz[i] * xT[i] + gzB[i] * xB[i]; };
+  out[0] = inverse[0] * (others(0) + gx[0] * x[n > 1 ? 1 : 0]);
+  for (int i = 1; i + 1 < n; ++i)
+  {
+    out[i] = inverse[i] * (others(i) + gx[i] * x[i + 1] + gx[i - 1] * x[i - 1]);
+  }
+  if (n > 1)
+  {
+    out[n - 1] = inverse[n - 1] * (others(n - 1) + gx[n - 2] * x[n - 2]);
+  }
+}
+} // namespace
+
+Triad::Triad(std::int64_t n, const ParallelFor& parallelFor)
+  : a(static_cast<std::size_t>(n), 1.)
+  , b(static_cast<std::size_t>(n), 2.)
+  , c(static_cast<std::size_t>(n), 0.5)
+{
+  this->pass(parallelFor);
+}
+
+double Triad::pass(const ParallelFor& parallelFor)
+{
+  constexpr std::int64_t block = 4096;
+  const std::int64_t n = static_cast<std::int64_t>(this->a.size());
+  const auto began = std::chrono::steady_clock::now();
+  parallelFor((n + block - 1) / block,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      const std::int64_t first = begin * block;
+      triad(std::min(end * block, n) - first, this->a.data() + first, this->b.data() + first,
+        this->c.data() + first);
+    });
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+}
+
+Jacobi::Jacobi(const Problem& p, const ParallelFor& parallelFor)
+  : problem(p)
+  , inverse(p.q.size())
+  , from(p.q.size(), 0.f)
+  , to(p.q.size(), 0.f)
+  , zeros(static_cast<std::size_t>(p.grid.dims[0]), 0.f)
+{
+  const std::array<int, 3>& n = p.grid.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  for (std::vector<float>& faces : this->g)
+  {
+    faces.assign(p.q.size(), 0.f);
+  }
+  parallelFor(static_cast<std::int64_t>(n[1]) * n[2],
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t i = begin * n[0]; i < end * n[0]; ++i)
+      {
+        const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>(i / n[0] % n[1]),
+          static_cast<int>(i / stride[2]) };
+        const double D = static_cast<double>(p.D[static_cast<std::size_t>(i)]);
+        double diagonal = static_cast<double>(p.sigma_a[static_cast<std::size_t>(i)]);
+        for (int d = 0; d < 3; ++d)
+        {
+          for (int side = -1; side <= 1; side += 2)
+          {
+            if (at[d] + side < 0 || at[d] + side >= n[d])
+            {
+              diagonal += BorderSink(D, p.boundary);
+              continue;
+            }
+            const double face = FaceConductance(
+              D, static_cast<double>(p.D[static_cast<std::size_t>(i + side * stride[d])]));
+            diagonal += face;
+            if (side > 0)
+            {
+              this->g[d][static_cast<std::size_t>(i)] = static_cast<float>(face);
+            }
+          }
+        }
+        this->inverse[static_cast<std::size_t>(i)] = static_cast<float>(1. / diagonal);
+      }
+    });
+}
+
+void Jacobi::sweep(const ParallelFor& parallelFor)
+{
+  const std::array<int, 3>& n = this->problem.grid.dims;
+  const std::int64_t nx = n[0];
+  const std::int64_t plane = nx * n[1];
+  parallelFor(static_cast<std::int64_t>(n[1]) * n[2],
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      const FlushDenormals flush;
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        const std::int64_t j = r % n[1];
+        const std::int64_t k = r / n[1];
+        const std::int64_t o = r * nx;
+        const float* x = this->from.data() + o;
+        const float* none = this->zeros.data();
+        const JacobiRow row{ this->g[0].data() + o, this->g[1].data() + o,
+          j > 0 ? this->g[1].data() + o - nx : none, this->g[2].data() + o,
+          k > 0 ? this->g[2].data() + o - plane : none, this->inverse.data() + o,
+          this->problem.q.data() + o, x, j > 0 ? x - nx : none, j + 1 < n[1] ? x + nx : none,
+          k > 0 ? x - plane : none, k + 1 < n[2] ? x + plane : none };
+        jacobi(n[0], row, this->to.data() + o);
+      }
+    });
+  this->from.swap(this->to);
+}
+} // namespace benchmark
+} // namespace lighttransport

@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/** The yardsticks of bench-diffusion: STREAM's triad and a plain Jacobi sweep. */
+#ifndef DiffusionSweeps_h
+#define DiffusionSweeps_h
+
+#include "DiffusionProblem.h"
+
+namespace lighttransport
+{
+namespace benchmark
+{
+/** a = b + 3 c on three arrays of doubles (McCalpin's STREAM): 24 bytes per element. */
+class Triad
+{
+public:
+  Triad(std::int64_t n, const ParallelFor& parallelFor);
+  /** Seconds of one pass. */
+  double pass(const ParallelFor& parallelFor);
+  double bytes() const { return 24. * static_cast<double>(this->a.size()); }
+
+private:
+  std::vector<double> a, b, c;
+};
+
+/**
+ * phi' = (q + sum g phi_neighbour) / diagonal in float, with precomputed faces and
+ * reciprocal diagonal: a sweep must move 3 faces, diagonal, q and phi in, phi out,
+ * 28 bytes per voxel.
+ */
+class Jacobi
+{
+public:
+  Jacobi(const Problem& problem, const ParallelFor& parallelFor);
+  void sweep(const ParallelFor& parallelFor);
+  const std::vector<float>& phi() const { return this->from; }
+  static constexpr double BytesPerVoxel = 28.;
+
+private:
+  const Problem& problem;
+  std::vector<float> g[3];
+  std::vector<float> inverse;
+  std::vector<float> from, to;
+  std::vector<float> zeros;
+};
+} // namespace benchmark
+} // namespace lighttransport
+
+#endif
