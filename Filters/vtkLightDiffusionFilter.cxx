@@ -5,6 +5,7 @@
 #include "Core/Diffusion.h"
 #include "Core/FirstMoment.h"
 #include "vtkLightTransportArrays.h"
+#include "vtkLightTransportCompat.h"
 #include "vtkLightTransportInternal.h"
 #include "vtkOpticalMediumFilter.h"
 
@@ -576,7 +577,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   control.progress = [this](double fraction)
   {
     this->UpdateProgress(fraction);
-    return !this->GetAbortExecute();
+    return !vtkLightTransportCheckAbort(this);
   };
   const bool local = this->LocalTimeStep && this->Mode == Explicit;
   const double bound = moment ? kept.moment->courantBound() : this->PositivityBound;

@@ -7,6 +7,7 @@
 #ifndef vtkLightTransportCompat_h
 #define vtkLightTransportCompat_h
 
+#include "vtkAlgorithm.h"
 #include "vtkVersionMacros.h"
 
 /** VTK_VERSION_CHECK exists since 8.90; kept here so that callers include one header. */
@@ -34,5 +35,18 @@
 #else
 #define LIGHTTRANSPORT_FACTORY_CONST
 #endif
+
+/**
+ * Whether a filter that is at work was asked to stop. CheckAbort, from 9.3 on, also
+ * asks upstream and marks the output. Can go when 9.2 is no longer supported.
+ */
+inline bool vtkLightTransportCheckAbort(vtkAlgorithm* algorithm)
+{
+#if LIGHTTRANSPORT_VTK_AT_LEAST(9, 3)
+  return algorithm->CheckAbort();
+#else
+  return algorithm->GetAbortExecute() != 0;
+#endif
+}
 
 #endif

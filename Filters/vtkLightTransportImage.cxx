@@ -287,11 +287,7 @@ lighttransport::ProgressFunction Progress(vtkAlgorithm* algorithm, double from, 
   return [algorithm, from, to](double fraction)
   {
     algorithm->UpdateProgress(from + (to - from) * fraction);
-#if LIGHTTRANSPORT_VTK_AT_LEAST(9, 3)
-    return !algorithm->CheckAbort();
-#else
-    return !algorithm->GetAbortExecute();
-#endif
+    return !vtkLightTransportCheckAbort(algorithm);
   };
 }
 } // namespace vtkLightTransportImage

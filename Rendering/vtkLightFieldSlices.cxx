@@ -232,9 +232,9 @@ public:
       panel.renderer->AddActor(panel.arrowFill.actor);
       for (auto& mark : panel.marks)
       {
-        panel.renderer->AddActor2D(mark);
+        panel.renderer->AddViewProp(mark);
       }
-      panel.renderer->AddActor2D(panel.caption);
+      panel.renderer->AddViewProp(panel.caption);
       panel.renderer->SetBackground(0., 0., 0.);
       panel.renderer->InteractiveOff();
       panel.renderer->GetActiveCamera()->ParallelProjectionOn();
@@ -244,7 +244,7 @@ public:
     this->Background->InteractiveOff();
     this->BarMapper->SetInputData(this->Bars);
     this->BarActor->SetMapper(this->BarMapper);
-    this->LegendRenderer->AddActor2D(this->BarActor);
+    this->LegendRenderer->AddViewProp(this->BarActor);
     this->LegendRenderer->SetBackground(0., 0., 0.);
     this->LegendRenderer->InteractiveOff();
   }
@@ -781,7 +781,7 @@ void vtkLightFieldSlices::vtkInternals::ArrangeLegend(
 {
   for (vtkTextActor* text : this->LegendTexts)
   {
-    this->LegendRenderer->RemoveActor2D(text);
+    this->LegendRenderer->RemoveViewProp(text);
   }
   this->LegendTexts.clear();
   this->Bars->Initialize();
@@ -819,7 +819,7 @@ void vtkLightFieldSlices::vtkInternals::ArrangeLegend(
       look->SetVerticalJustificationToCentered();
     }
     text->SetPosition(label.x, label.y);
-    this->LegendRenderer->AddActor2D(text);
+    this->LegendRenderer->AddViewProp(text);
     this->LegendTexts.emplace_back(text);
   }
 }
