@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
 /** The first-moment system: exact solutions, finite speed, no checkerboard, balance, bounds. */
+#include "CollocatedMoments.h"
 #include "Core/FirstMoment.h"
 #include "DiffusionScene.h"
 #include "LightTransportTesting.h"
@@ -10,6 +11,7 @@
 #include <random>
 
 using namespace lighttransport;
+using lighttransport::testing::CollocatedMoments;
 using lighttransport::testing::DiffusionScene;
 using lighttransport::testing::Suite;
 using lighttransport::testing::ThreadedFor;
@@ -217,44 +219,6 @@ void front3D(Suite& suite)
   }
 }
 
-/** The thesis's eq. 3.25 (with sigma_a, as it must be) and 3.26: all on the same points, FTCS. */
-struct Collocated
-{
-  int n;
-  std::vector<double> phi, Ex, Ey;
-
-  explicit Collocated(int size)
-    : n(size)
-    , phi(static_cast<std::size_t>(size * size), 0.)
-    , Ex(phi)
-    , Ey(phi)
-  {
-  }
-  void step(const std::vector<double>& q, double sigma_a, double sigma_t, double r)
-  {
-    const std::vector<double> p = this->phi;
-    const std::vector<double> ex = this->Ex;
-    const std::vector<double> ey = this->Ey;
-    const auto at = [&](const std::vector<double>& v, int i, int j)
-    {
-      return i < 0 || j < 0 || i >= this->n || j >= this->n
-        ? 0.
-        : v[static_cast<std::size_t>(i + this->n * j)];
-    };
-    for (int j = 0; j < this->n; ++j)
-    {
-      for (int i = 0; i < this->n; ++i)
-      {
-        const std::size_t c = static_cast<std::size_t>(i + this->n * j);
-        this->phi[c] = r * q[c] + (1. - sigma_a * r) * p[c] -
-          0.5 * r * (at(ex, i + 1, j) - at(ex, i - 1, j) + at(ey, i, j + 1) - at(ey, i, j - 1));
-        this->Ex[c] = (1. - sigma_t * r) * ex[c] - r / 6. * (at(p, i + 1, j) - at(p, i - 1, j));
-        this->Ey[c] = (1. - sigma_t * r) * ey[c] - r / 6. * (at(p, i, j + 1) - at(p, i, j - 1));
-      }
-    }
-  }
-};
-
 /** Of the energy away from the lamp, the part that alternates along both axes. */
 double checkerboard(const std::vector<double>& phi, int n, int lamp)
 {
@@ -305,7 +269,7 @@ void noCheckerboard(Suite& suite)
           (pulse ? scene.phi : scene.q)[static_cast<std::size_t>(n / 2 + a + n * (n / 2 + b))] = 1.;
         }
       }
-      Collocated thesis(n);
+      CollocatedMoments thesis(n);
       thesis.phi = scene.phi;
       FirstMomentSolver solver;
       solver.setMedium(scene.medium());
