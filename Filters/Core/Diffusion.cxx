@@ -246,8 +246,21 @@ std::int64_t DiffusionSolver::bytesHeld() const
 template <class T>
 DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
 {
-  DiffusionReport report;
   const double began = now();
+  DiffusionReport report = this->check(medium);
+  if (report.reason == StopReason::Converged)
+  {
+    this->assemble(medium, {});
+    report.bytes = this->bytesHeld();
+  }
+  report.seconds = now() - began;
+  return report;
+}
+
+template <class T>
+DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
+{
+  DiffusionReport report;
   this->box = medium.grid;
   this->shift = 0.;
   this->sinkWithoutShift.release();
@@ -279,13 +292,9 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
     return bad("the refractive index ratio is not positive");
   }
 
-  // A voxel outside the domain is a wall; so is one whose D is 0.
+  // 1. check, and find the scale: no diagonal is above it
   const T* D = medium.D;
   const std::uint8_t* outside = medium.outside;
-  const auto diffusion = [D, outside](std::int64_t i)
-  { return outside && outside[i] ? T(0) : D[i]; };
-
-  // 1. check, and find the scale: no diagonal is above it
   struct Extremes
   {
     std::int64_t badD = -1, badSigma = -1;
@@ -364,21 +373,44 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   {
     return bad("D / spacing^2 is too large for double precision");
   }
+  report.reason = StopReason::Converged;
+  return report;
+}
+
+template <class T>
+void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Span> spans)
+{
+  const std::array<int, 3>& n = this->box.dims;
+  const std::array<double, 3>& h = this->box.spacing;
+  // A voxel outside the domain is a wall; so is one whose D is 0.
+  const T* D = medium.D;
+  const std::uint8_t* outside = medium.outside;
+  const auto diffusion = [D, outside](std::int64_t i)
+  { return outside && outside[i] ? T(0) : D[i]; };
 
   // 2. the operator
+  this->multigrid.release();
+  this->multigridReady = false;
   this->A.allocate(n);
+  const bool whole = spans.empty();
+  if (!whole)
+  {
+    this->A.restrictTo(std::move(spans));
+  }
   this->boundaryOf(medium.boundary);
   const double twoA =
     medium.boundary == Boundary::Robin ? 2. * BoundaryFactor(medium.refractiveIndexRatio) : 0.;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   const double inverse = 1. / this->scale;
-  ForRows(this->parallelFor, this->rows(), size,
+  ForRows(this->parallelFor, this->A.numberOfRows(), this->A.activeSize,
     [&](std::int64_t begin, std::int64_t end)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      for (std::int64_t t = begin; t < end; ++t)
       {
+        const std::int64_t r = this->A.row(t);
+        const Span span = this->A.span(r);
         int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-        for (at[0] = 0; at[0] < n[0]; ++at[0])
+        for (at[0] = span.begin; at[0] < span.end; ++at[0])
         {
           const std::int64_t i = at[0] + r * n[0];
           const T Di = diffusion(i);
@@ -389,8 +421,19 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
           {
             if (at[d] + 1 < n[d])
             {
-              this->A.g[d][i] = static_cast<float>(
-                harmonicMean(Di, diffusion(i + stride[d])) * inverse / (h[d] * h[d]));
+              const double g = harmonicMean(Di, diffusion(i + stride[d])) * inverse / (h[d] * h[d]);
+              if (whole || this->isActive(d, at, 1))
+              {
+                this->A.g[d][i] = static_cast<float>(g);
+              }
+              else
+              {
+                sink += g; // beyond the active region phi is 0
+              }
+            }
+            if (!whole && at[d] > 0 && !this->isActive(d, at, -1))
+            {
+              sink += harmonicMean(Di, diffusion(i - stride[d])) * inverse / (h[d] * h[d]);
             }
             if (n[d] > 1 && medium.boundary != Boundary::ZeroFlux)
             {
@@ -418,15 +461,17 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
     float diagonal = 0.f, gershgorin = 0.f;
     bool sink = false, noSink = false, wall = false;
   };
-  std::vector<Summary> summaries(static_cast<std::size_t>(this->rows()));
-  ForRows(this->parallelFor, this->rows(), size,
+  std::vector<Summary> summaries(static_cast<std::size_t>(this->A.numberOfRows()));
+  ForRows(this->parallelFor, this->A.numberOfRows(), this->A.activeSize,
     [&](std::int64_t begin, std::int64_t end)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      for (std::int64_t t = begin; t < end; ++t)
       {
-        Summary& summary = summaries[static_cast<std::size_t>(r)];
+        const std::int64_t r = this->A.row(t);
+        const Span span = this->A.span(r);
+        Summary& summary = summaries[static_cast<std::size_t>(t)];
         const int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-        for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
+        for (std::int64_t i = r * n[0] + span.begin; i < r * n[0] + span.end; ++i)
         {
           if (outside && outside[i])
           {
@@ -457,11 +502,15 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   this->everySink = !total.noSink;
   this->anyWall = total.wall || outside;
   CloseIsolated(this->A, NoSink, this->parallelFor);
+}
 
-  report.reason = StopReason::Converged;
-  report.seconds = now() - began;
-  report.bytes = this->bytesHeld();
-  return report;
+bool DiffusionSolver::isActive(int d, const int at[3], int step) const
+{
+  int other[3] = { at[0], at[1], at[2] };
+  other[d] += step;
+  const Span span =
+    this->A.span(other[1] + static_cast<std::int64_t>(this->box.dims[1]) * other[2]);
+  return other[0] >= span.begin && other[0] < span.end;
 }
 
 void DiffusionSolver::boundaryOf(Boundary boundary)
@@ -936,33 +985,26 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
 template <class T>
 void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& report) const
 {
-  const int nx = this->box.dims[0];
   const double V = this->box.voxelVolume();
-  const std::int64_t size = this->box.size();
-  report.emitted = !q ? 0.
-                      : V *
-      SumRows(this->parallelFor, this->rows(), size,
-        [&](std::int64_t r)
+  const auto sum = [&](auto&& term)
+  {
+    return SumEachRow(this->A, this->parallelFor,
+      [&](std::int64_t, std::int64_t o, int n)
+      {
+        double s = 0.;
+        for (std::int64_t i = o; i < o + n; ++i)
         {
-          double sum = 0.;
-          for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
-          {
-            sum += static_cast<double>(q[i]);
-          }
-          return sum;
-        });
+          s += term(i);
+        }
+        return s;
+      });
+  };
+  // an active region holds all sources
+  report.emitted = !q ? 0. : V * sum([&](std::int64_t i) { return static_cast<double>(q[i]); });
   const Buffer<float>& sinks = this->sinkWithoutShift.empty() ? this->A.s : this->sinkWithoutShift;
   const double lost = V * this->scale *
-    SumRows(this->parallelFor, this->rows(), size,
-      [&](std::int64_t r)
-      {
-        double sum = 0.;
-        for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
-        {
-          sum += sinks[i] > NoSink ? static_cast<double>(sinks[i]) * phi[i] : 0.;
-        }
-        return sum;
-      });
+    sum([&](std::int64_t i)
+      { return sinks[i] > NoSink ? static_cast<double>(sinks[i]) * phi[i] : 0.; });
   double escaped = 0.;
   const std::array<int, 3>& n = this->box.dims;
   for (int d = 0; d < 3; ++d)
@@ -989,7 +1031,7 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
     }
   }
   report.escaped = escaped * V * this->scale;
-  report.absorbed = lost - report.escaped;
+  report.absorbed = lost - report.escaped - report.leaked;
 }
 
 //------------------------------------------------------------------------------
@@ -1134,6 +1176,191 @@ DiffusionReport DiffusionSolver::solveSteady(
     }
     this->balance(q, phi, report);
   }
+  report.seconds = now() - began;
+  return report;
+}
+
+//------------------------------------------------------------------------------
+template <class T, class Q>
+DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, const Q* q,
+  double* phi, const DiffusionControl& control, double threshold)
+{
+  const double began = now();
+  DiffusionReport report = this->check(medium);
+  if (report.reason != StopReason::Converged)
+  {
+    return report;
+  }
+  const std::array<int, 3>& n = this->box.dims;
+  const std::int64_t size = this->box.size();
+  std::fill(phi, phi + size, 0.);
+  constexpr int edge = 8; // of a tile, as OpenVDB's leaves
+  const std::array<int, 3> tiles{ { (n[0] + edge - 1) / edge, (n[1] + edge - 1) / edge,
+    (n[2] + edge - 1) / edge } };
+  const auto tileAt = [&](int i, int j, int k) {
+    return static_cast<std::size_t>(i + tiles[0] * (j + static_cast<std::int64_t>(tiles[1]) * k));
+  };
+  std::vector<std::uint8_t> active(tileAt(0, 0, tiles[2]), 0);
+  const auto grow = [&](const std::vector<std::uint8_t>& from)
+  {
+    for (int k = 0; k < tiles[2]; ++k)
+    {
+      for (int j = 0; j < tiles[1]; ++j)
+      {
+        for (int i = 0; i < tiles[0]; ++i)
+        {
+          if (from[tileAt(i, j, k)])
+          {
+            for (int c = std::max(0, k - 1); c <= std::min(tiles[2] - 1, k + 1); ++c)
+            {
+              for (int b = std::max(0, j - 1); b <= std::min(tiles[1] - 1, j + 1); ++b)
+              {
+                for (int a = std::max(0, i - 1); a <= std::min(tiles[0] - 1, i + 1); ++a)
+                {
+                  active[tileAt(a, b, c)] = 1;
+                }
+              }
+            }
+          }
+        }
+      }
+    }
+  };
+  // the tiles with sources, and those around them
+  {
+    std::vector<std::uint8_t> sources(active.size(), 0);
+    for (std::int64_t r = 0; r < this->rows(); ++r)
+    {
+      for (int i = 0; i < n[0]; ++i)
+      {
+        if (q[i + r * n[0]] != Q(0))
+        {
+          sources[tileAt(
+            i / edge, static_cast<int>(r % n[1]) / edge, static_cast<int>(r / n[1]) / edge)] = 1;
+        }
+      }
+    }
+    grow(sources);
+  }
+
+  DiffusionControl rough;
+  rough.tolerance = std::max(control.tolerance, 1e-4);
+  rough.maxIterations = 4;
+  rough.progress = control.progress;
+  double spent = 0.;
+  bool last = false; // the region holds: solve to the end
+  for (;;)
+  {
+    // rows' spans: from the first to the last active tile
+    std::vector<Span> spans(static_cast<std::size_t>(this->rows()));
+    std::int64_t activeSize = 0;
+    for (std::int64_t r = 0; r < this->rows(); ++r)
+    {
+      const int j = static_cast<int>(r % n[1]) / edge;
+      const int k = static_cast<int>(r / n[1]) / edge;
+      Span& span = spans[static_cast<std::size_t>(r)];
+      for (int i = 0; i < tiles[0]; ++i)
+      {
+        if (active[tileAt(i, j, k)])
+        {
+          span.begin = span.end == 0 ? i * edge : span.begin;
+          span.end = std::min(n[0], (i + 1) * edge);
+        }
+      }
+      activeSize += span.end - span.begin;
+    }
+    // Light that fills the volume is better solved on the volume.
+    if (4 * activeSize > size)
+    {
+      this->assemble(medium, {});
+      const int before = report.iterations;
+      const double applications = report.fineApplications;
+      report = this->solveSteady(q, phi, control);
+      report.iterations += before;
+      report.fineApplications += applications;
+      break;
+    }
+    this->assemble(medium, std::move(spans));
+    if (!this->anySink)
+    {
+      active.assign(active.size(), 1); // nowhere to go: the whole volume tells
+      continue;
+    }
+    const RightHandSide<Q> b{ q, 1. / this->scale };
+    report.leaked = 0.;
+    this->conjugateGradients(b, phi, last ? control : rough, 0., last ? 1. : 0., report);
+    spent += report.fineApplications * static_cast<double>(activeSize) / static_cast<double>(size);
+    report.fineApplications = 0.;
+    if (report.reason != StopReason::Converged && report.reason != StopReason::MaxIterations)
+    {
+      break;
+    }
+    // what stands at the region's border
+    double largest = 0.;
+    for (std::int64_t t = 0; t < this->A.numberOfRows(); ++t)
+    {
+      const std::int64_t r = this->A.row(t);
+      const Span span = this->A.span(r);
+      for (std::int64_t i = r * n[0] + span.begin; i < r * n[0] + span.end; ++i)
+      {
+        largest = std::max(largest, std::abs(phi[i]));
+      }
+    }
+    std::vector<std::uint8_t> lit(active.size(), 0);
+    bool any = false;
+    double leaked = 0.;
+    const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+    const auto D = [&](std::int64_t i)
+    { return medium.outside && medium.outside[i] ? T(0) : medium.D[i]; };
+    for (std::int64_t t = 0; t < this->A.numberOfRows(); ++t)
+    {
+      const std::int64_t r = this->A.row(t);
+      const Span span = this->A.span(r);
+      int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
+      // inside a row, a border is at its ends or where a neighbouring row does not follow
+      for (at[0] = span.begin; at[0] < span.end; ++at[0])
+      {
+        for (int d = 0; d < 3; ++d)
+        {
+          for (int side = -1; side <= 1; side += 2)
+          {
+            if (at[d] + side < 0 || at[d] + side >= n[d] || this->isActive(d, at, side))
+            {
+              continue;
+            }
+            const std::int64_t i = at[0] + r * n[0];
+            const double g = harmonicMean(D(i), D(i + side * stride[d])) /
+              (this->box.spacing[d] * this->box.spacing[d]);
+            leaked += g * phi[i];
+            // what would stand beyond, were nothing lost there
+            if (g > 0. && std::abs(phi[i]) > threshold * largest)
+            {
+              lit[tileAt(at[0] / edge, at[1] / edge, at[2] / edge)] = 1;
+              any = true;
+            }
+          }
+        }
+      }
+    }
+    report.leaked = leaked * this->box.voxelVolume();
+    if (any)
+    {
+      grow(lit);
+      last = false;
+    }
+    else if (last)
+    {
+      this->balance(q, phi, report);
+      break;
+    }
+    else
+    {
+      last = true;
+    }
+  }
+  report.activeFraction =
+    static_cast<double>(this->A.activeSize) / static_cast<double>(std::max<std::int64_t>(size, 1));
+  report.fineApplications += spent;
   report.seconds = now() - began;
   return report;
 }
@@ -1347,13 +1574,19 @@ void DiffusionSolver::flux(const double* phi, T* E) const
   const std::array<int, 3>& n = this->box.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   // g = D_f / (h^2 scale): the face's flux is g h scale (phi - phi_next).
-  ForRows(this->parallelFor, this->rows(), this->box.size(),
+  if (!this->A.spans.empty())
+  {
+    std::fill(E, E + 3 * this->box.size(), T(0));
+  }
+  ForRows(this->parallelFor, this->A.numberOfRows(), this->A.activeSize,
     [&](std::int64_t begin, std::int64_t end)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      for (std::int64_t t = begin; t < end; ++t)
       {
+        const std::int64_t r = this->A.row(t);
+        const Span span = this->A.span(r);
         int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-        for (at[0] = 0; at[0] < n[0]; ++at[0])
+        for (at[0] = span.begin; at[0] < span.end; ++at[0])
         {
           const std::int64_t i = at[0] + r * n[0];
           for (int d = 0; d < 3; ++d)
@@ -1391,6 +1624,10 @@ void DiffusionSolver::flux(const double* phi, T* E) const
 //------------------------------------------------------------------------------
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
   template DiffusionReport DiffusionSolver::setMedium<T>(const DiffusionMedium<T>&);               \
+  template DiffusionReport DiffusionSolver::solveActive<T, float>(                                 \
+    const DiffusionMedium<T>&, const float*, double*, const DiffusionControl&, double);            \
+  template DiffusionReport DiffusionSolver::solveActive<T, double>(                                \
+    const DiffusionMedium<T>&, const double*, double*, const DiffusionControl&, double);           \
   template DiffusionReport DiffusionSolver::solveSteady<T>(                                        \
     const T*, double*, const DiffusionControl&);                                                   \
   template DiffusionReport DiffusionSolver::stepExplicit<T>(                                       \

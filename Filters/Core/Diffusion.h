@@ -95,9 +95,11 @@ struct DiffusionReport
   std::int64_t bytes = 0; ///< held while solving, beyond the caller's arrays
   /** Applications of the operator on the finest grid, or sweeps that cost as much. */
   double fineApplications = 0.;
-  double emitted = 0.;  ///< power: the integral of q over the domain
-  double absorbed = 0.; ///< power: of sigma_a phi
-  double escaped = 0.;  ///< power through the border
+  double emitted = 0.;        ///< power: the integral of q over the domain
+  double absorbed = 0.;       ///< power: of sigma_a phi
+  double escaped = 0.;        ///< power through the border
+  double leaked = 0.;         ///< power that left an active region, its truncation error
+  double activeFraction = 1.; ///< of the voxels that took part
 };
 
 /** Called between iterations with a fraction done in [0, 1]; false cancels. */
@@ -157,6 +159,17 @@ public:
   DiffusionReport solveSteady(const T* q, double* phi, const DiffusionControl& control);
 
   /**
+   * The steady state on an active region: tiles around the sources, grown where more than
+   * `threshold` (of the largest |phi|) stands at the region's border, with phi = 0
+   * beyond. Light that stays in a vessel then does not cost the whole volume; light that fills
+   * a quarter of it is solved on the whole. phi is out only. The operator that is kept is the
+   * region's: setMedium before another kind of solve.
+   */
+  template <class T, class Q>
+  DiffusionReport solveActive(const DiffusionMedium<T>& medium, const Q* q, double* phi,
+    const DiffusionControl& control, double threshold = 1e-7);
+
+  /**
    * Time steps of length c dt (a length > 0) from phi:
    * forward Euler, whose positivity and stability bounds are below, or those of
    * control.implicitScheme, each to `tolerance`. q may be null: none.
@@ -191,6 +204,15 @@ public:
   const Grid& grid() const { return this->box; }
 
 private:
+  /** Checks the medium and sets the scale. */
+  template <class T>
+  DiffusionReport check(const DiffusionMedium<T>& medium);
+  /** Writes the operator, on the spans (all, where there are none). */
+  template <class T>
+  void assemble(const DiffusionMedium<T>& medium, std::vector<Span> spans);
+  /** Whether the voxel one step along axis d, inside the box, belongs to the active region. */
+  bool isActive(int d, const int at[3], int step) const;
+
   /**
    * b = qScale q + shift previous - mean, in the units of the scaled operator. The shift is
    * the one that float sinks have taken up, so that implicit steps end in the steady state.
