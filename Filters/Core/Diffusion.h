@@ -120,7 +120,7 @@ struct DiffusionControl
   DiffusionProgress progress; ///< may be empty; also called every 20 ms while a pass runs
   /**
    * Where above 0, the solve ends with Converged as soon as the estimated error (see
-   * DiffusionReport) is at or below it, or the tolerance is met.
+   * DiffusionReport) is at or below half of it, or the tolerance is met.
    */
   double targetError = 0.;
   /** Where above 0, seconds after which the best answer so far is returned (MaxIterations). */

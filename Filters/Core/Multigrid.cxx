@@ -11,6 +11,8 @@ namespace lighttransport
 {
 namespace
 {
+using Weights = MultigridWeights;
+
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
 {
@@ -163,12 +165,11 @@ inline float halfResistance(float g)
  * coarse centre to coarse centre: half the inner face on either side (`below`,
  * `above`) in series with the face between. Where the voxel above is its own centre
  * (f >= paired, or no `above`), there is no inner face there. Writes the weight of the
- * other parent for both voxels at the face, and the line's conductance where that
- * is asked for.
+ * other parent for both voxels at the face.
  */
 LIGHTTRANSPORT_SIMD
 void lineRow(int first, int last, int step, int paired, const float* between, const float* below,
-  const float* above, std::uint8_t* w, std::uint8_t* wNext, float* conductance)
+  const float* above, std::uint8_t* w, std::uint8_t* wNext)
 {
   for (int i = first; i < last; i += step)
   {
@@ -177,27 +178,53 @@ void lineRow(int first, int last, int step, int paired, const float* between, co
     const float there = above && i < paired ? halfResistance(above[i]) : 0.f;
     const float whole = here + 1.f / (g > 1e-30f ? g : 1e-30f) + there;
     const float open = g > 1e-30f ? 255.f / whole : 0.f;
-    if (conductance)
-    {
-      conductance[i] = whole < 1e25f ? open * (1.f / 255.f) : 0.f;
-    }
     w[i] = static_cast<std::uint8_t>(here * open + 0.5f);
     wNext[i] = static_cast<std::uint8_t>(there * open + 0.5f);
   }
 }
 
-/** (factor + slope (here + there)) is a voxel's or a line's weight for a coarse row. */
-struct Weights
-{
-  const std::uint8_t *here, *there;
-  float factor, slope;
-};
-
-/** own += v fy fz (1 - wx), next += v fy fz wx */
+/**
+ * Adds the conductance of the lines along one axis from a voxel to its parent
+ * (half the inner face) and to its parent's neighbour (the face between in
+ * series with half the neighbour's inner face). Null: no such face; a voxel that is
+ * its own centre has no inner face and is tied to its parent without resistance.
+ */
 LIGHTTRANSPORT_SIMD
-void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const Weights& x, const Weights& y,
-  const Weights& z, float* LIGHTTRANSPORT_RESTRICT own, float* LIGHTTRANSPORT_RESTRICT next)
+void tieRow(int first, int last, int step, const float* inner, const float* between,
+  const float* beyond, float* tie)
 {
+  for (int i = first; i < last; i += step)
+  {
+    const float parent = inner ? 2.f * inner[i] : 1e30f;
+    const float far = between && between[i] > 1e-30f
+      ? 1.f / (1.f / between[i] + (beyond ? halfResistance(beyond[i]) : 0.f))
+      : 0.f;
+    tie[i] += parent + far;
+  }
+}
+
+/** kept = G / (G + s), what is left of a sink seen from the parents is s kept. */
+LIGHTTRANSPORT_SIMD
+void keepRow(int n, const float* LIGHTTRANSPORT_RESTRICT tie,
+  const float* LIGHTTRANSPORT_RESTRICT s, std::uint8_t* LIGHTTRANSPORT_RESTRICT kept,
+  float* LIGHTTRANSPORT_RESTRICT sink)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    const float sum = tie[i] + s[i];
+    const float part = sum > 1e-30f ? tie[i] / sum : 1.f;
+    kept[i] = static_cast<std::uint8_t>(255.f * part + 0.5f);
+    sink[i] = s[i] * part;
+  }
+}
+
+/** own += v kept fy fz (1 - wx), next += v kept fy fz wx; kept may be null: 1 */
+LIGHTTRANSPORT_SIMD
+void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const std::uint8_t* kept,
+  const Weights& x, const Weights& y, const Weights& z, float* LIGHTTRANSPORT_RESTRICT own,
+  float* LIGHTTRANSPORT_RESTRICT next)
+{
+  constexpr float unit = 1.f / 255.f;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT x0 = x.here;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT x1 = x.there;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT y0 = y.here;
@@ -207,19 +234,53 @@ void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const Weights& x, 
   const float cy = y.factor, sy = y.slope, cz = z.factor, sz = z.slope;
   for (int i = 0; i < n; ++i)
   {
-    const float t = v[i] * (cy + sy * static_cast<float>(y0[i] + y1[i])) *
-      (cz + sz * static_cast<float>(z0[i] + z1[i]));
+    const float t = v[i] * (kept ? unit * static_cast<float>(kept[i]) : 1.f) *
+      (cy + sy * static_cast<float>(y0[i] + y1[i])) * (cz + sz * static_cast<float>(z0[i] + z1[i]));
     const float u = t * (static_cast<float>(x0[i] + x1[i]) * (0.5f / 255.f));
     own[i] += t - u;
     next[i] += u;
   }
 }
 
-/** x += the tensor product of the three weights on eight coarse values. */
+/** gatherRow for the face between coarse voxels and the inner faces below and above it. */
+LIGHTTRANSPORT_SIMD
+void gatherFacesRow(int n, const float* LIGHTTRANSPORT_RESTRICT between,
+  const float* LIGHTTRANSPORT_RESTRICT below, const float* LIGHTTRANSPORT_RESTRICT above,
+  const Weights& x, const Weights& y, const Weights& z, float* LIGHTTRANSPORT_RESTRICT own,
+  float* LIGHTTRANSPORT_RESTRICT next, std::size_t room)
+{
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT x0 = x.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT x1 = x.there;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT y0 = y.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT y1 = y.there;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT z0 = z.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT z1 = z.there;
+  const float cy = y.factor, sy = y.slope, cz = z.factor, sz = z.slope;
+  float* LIGHTTRANSPORT_RESTRICT own1 = own + room;
+  float* LIGHTTRANSPORT_RESTRICT own2 = own + 2 * room;
+  float* LIGHTTRANSPORT_RESTRICT next1 = next + room;
+  float* LIGHTTRANSPORT_RESTRICT next2 = next + 2 * room;
+  for (int i = 0; i < n; ++i)
+  {
+    const float t =
+      (cy + sy * static_cast<float>(y0[i] + y1[i])) * (cz + sz * static_cast<float>(z0[i] + z1[i]));
+    const float u = t * (static_cast<float>(x0[i] + x1[i]) * (0.5f / 255.f));
+    const float p = t - u;
+    own[i] += between[i] * p;
+    next[i] += between[i] * u;
+    own1[i] += below[i] * p;
+    next1[i] += below[i] * u;
+    own2[i] += above[i] * p;
+    next2[i] += above[i] * u;
+  }
+}
+
+/** x += kept times the tensor product of the three weights on eight coarse values. */
 LIGHTTRANSPORT_SIMD
 void prolongRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx,
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz,
-  const float* const* up, const float* const* side, float* LIGHTTRANSPORT_RESTRICT x)
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept, const float* const* up,
+  const float* const* side, float* LIGHTTRANSPORT_RESTRICT x)
 {
   const float* LIGHTTRANSPORT_RESTRICT u0 = up[0];
   const float* LIGHTTRANSPORT_RESTRICT u1 = up[1];
@@ -241,7 +302,7 @@ void prolongRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx,
     const float v3 = u3[i] + a * (s3[i] - u3[i]);
     const float y0 = v0 + b * (v1 - v0);
     const float y1 = v2 + b * (v3 - v2);
-    x[i] += y0 + c * (y1 - y0);
+    x[i] += unit * static_cast<float>(kept[i]) * (y0 + c * (y1 - y0));
   }
 }
 
@@ -392,7 +453,7 @@ std::int64_t Multigrid::bytes() const
   {
     // what the domain touches of each: the rest of the memory stays with the system
     const DiffusionOperator& A = &level == &this->levels.front() ? *this->finest : level.A;
-    const std::int64_t perVoxel = (level.x.empty() ? 0 : 8) + (level.r.empty() ? 0 : 4) +
+    const std::int64_t perVoxel = (level.x.empty() ? 0 : 8) + (level.r.empty() ? 0 : 5) +
       static_cast<std::int64_t>(!level.w[0].empty()) + !level.w[1].empty() + !level.w[2].empty();
     sum += level.A.bytes() + A.activeSize * perVoxel;
   }
@@ -463,6 +524,7 @@ void Multigrid::coarsen(
     }
   }
   fine.noWeight.allocate(n[0]);
+  fine.kept.allocate(A.size());
   fine.r.allocate(A.size());
   coarse.A.allocate(nc);
   coarse.x.allocate(coarse.A.size());
@@ -484,15 +546,11 @@ void Multigrid::coarsen(
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
 
   // 3. the weights, from the lines through the coarse faces
-  const auto forLines = [&](int d, float* conductance)
+  const auto forLines = [&](int d)
   {
     ForEachRow(A, parallelFor,
       [&](std::int64_t row, std::int64_t o, int length)
       {
-        if (conductance)
-        {
-          std::fill(conductance + o, conductance + o + length, 0.f);
-        }
         if (d == 0)
         {
           // faces after the odd voxels; the last voxel of an odd row is its own centre
@@ -501,7 +559,7 @@ void Multigrid::coarsen(
           const int last = std::min(static_cast<int>(o - begin) + length, n[0] - 1);
           const float* g = A.g[0].data() + begin;
           lineRow(first, last, 2, n[0] - 2, g, g - 1, g + 1, fine.w[0].data() + begin,
-            fine.w[0].data() + begin + 1, conductance ? conductance + begin : nullptr);
+            fine.w[0].data() + begin + 1);
           return;
         }
         const int at = d == 1 ? static_cast<int>(row % n[1]) : static_cast<int>(row / n[1]);
@@ -510,7 +568,7 @@ void Multigrid::coarsen(
           const float* g = A.g[d].data() + o;
           const float* above = at + 2 < n[d] ? g + stride[d] : nullptr;
           lineRow(0, length, 1, length, g, g - stride[d], above, fine.w[d].data() + o,
-            fine.w[d].data() + o + stride[d], conductance ? conductance + o : nullptr);
+            fine.w[d].data() + o + stride[d]);
         }
       });
   };
@@ -518,53 +576,110 @@ void Multigrid::coarsen(
   {
     if (fine.halved[d])
     {
-      forLines(d, nullptr);
+      forLines(d);
     }
   }
-  // 2. each line's conductance goes to the coarse columns that its voxels are put between
+  // 2. faces go to the coarse columns that their voxels are put between
   for (int d = 0; d < 3; ++d)
   {
-    const float* lines = A.g[d].data();
     if (fine.halved[d])
     {
-      forLines(d, fine.r.data());
-      lines = fine.r.data();
+      this->gatherFaces(A, fine, coarse.A, d, coarse.A.g[d].data(), parallelFor);
     }
-    gather(A, fine, coarse.A, lines, d, coarse.A.g[d].data(), parallelFor);
-  }
-  // Sinks stay with the parent: a strong one pulls its own voxel down, not the neighbour's.
-  ForEachRow(coarse.A, parallelFor,
-    [&](std::int64_t row, std::int64_t, int)
+    else
     {
-      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-      int first[3];
-      int last[3];
-      for (int d = 1; d < 3; ++d)
+      gather(A, fine, coarse.A, A.g[d].data(), nullptr, d, coarse.A.g[d].data(), parallelFor);
+    }
+  }
+  // A sink pulls its own voxel down, and the parents only as far as the voxel is tied to them:
+  // the balance of flux there has the sink beside the lines.
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int length)
+    {
+      static thread_local std::vector<float> store;
+      store.assign(static_cast<std::size_t>(n[0]), 0.f);
+      const int begin = static_cast<int>(o - row * n[0]);
+      const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+      float* tie = store.data() + begin;
+      for (int d = 0; d < 3; ++d)
       {
-        first[d] = fine.halved[d] ? 2 * J[d] : J[d];
-        last[d] = fine.halved[d] ? std::min(2 * J[d] + 1, n[d] - 1) : J[d];
-      }
-      float* sink = coarse.A.s.data() + row * nc[0];
-      for (int k = first[2]; k <= last[2]; ++k)
-      {
-        for (int j = first[1]; j <= last[1]; ++j)
+        if (!fine.halved[d])
         {
-          const std::int64_t child = j + static_cast<std::int64_t>(n[1]) * k;
-          const Span span = A.span(child);
-          const float* s = A.s.data() + child * n[0];
-          for (int i = span.begin; i < span.end; ++i)
-          {
-            sink[fine.halved[0] ? i / 2 : i] += s[i];
-          }
+          continue;
+        }
+        const float* g = A.g[d].data() + o;
+        if (d > 0)
+        {
+          const bool odd = at[d] % 2 == 1;
+          const std::int64_t t = stride[d];
+          const float* inner = odd ? g - t : at[d] + 1 < n[d] ? g : nullptr;
+          const float* between = odd ? (at[d] + 1 < n[d] ? g : nullptr)
+            : at[d] > 0              ? g - t
+                                     : nullptr;
+          const float* beyond = odd ? (at[d] + 2 < n[d] ? g + t : nullptr)
+            : at[d] > 1             ? g - 2 * t
+                                    : nullptr;
+          tieRow(0, length, 1, inner, between, beyond, tie);
+          continue;
+        }
+        const int lone = n[0] % 2 == 1 ? n[0] - 1 : n[0]; // its own centre
+        const float* whole = A.g[0].data() + row * n[0];
+        float* all = store.data();
+        // odd voxels, then even ones; faces outside the row are 0
+        tieRow(begin | 1, std::min(begin + length, n[0] - 2), 2, whole - 1, whole, whole + 1, all);
+        for (int i = std::max(begin | 1, n[0] - 2 + (n[0] % 2 == 0 ? 0 : 1)); i < begin + length;
+             i += 2)
+        {
+          tieRow(i, i + 1, 2, whole - 1, i + 1 < n[0] ? whole : nullptr, nullptr, all);
+        }
+        for (int i = begin + (begin & 1); i < begin + length; i += 2)
+        {
+          tieRow(i, i + 1, 2, i == lone ? nullptr : whole, i > 0 ? whole - 1 : nullptr,
+            i > 1 ? whole - 2 : nullptr, all);
         }
       }
+      keepRow(length, tie, A.s.data() + o, fine.kept.data() + o, fine.r.data() + o);
     });
+  gather(A, fine, coarse.A, fine.r.data(), nullptr, -1, coarse.A.s.data(), parallelFor);
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
 }
 
+Multigrid::Footprint Multigrid::footprint(
+  const Level& fine, const std::array<int, 3>& n, const int J[3], int along) const
+{
+  Footprint rows;
+  for (int d = 1; d < 3; ++d)
+  {
+    rows.first[d] = !fine.halved[d] ? J[d] : d == along ? 2 * J[d] + 1 : std::max(0, 2 * J[d] - 1);
+    rows.last[d] = !fine.halved[d] ? J[d]
+      : d == along                 ? std::min(2 * J[d] + 1, n[d] - 1)
+                                   : std::min(2 * J[d] + 2, n[d] - 1);
+  }
+  return rows;
+}
+
+void Multigrid::weigh(const Level& fine, const int at[3], const int J[3], std::int64_t f, int along,
+  std::int64_t other, Weights weights[3]) const
+{
+  for (int d = 0; d < 3; ++d)
+  {
+    if (fine.halved[d] && d != along)
+    {
+      const std::uint8_t* w = fine.w[d].data() + f;
+      const bool parent = d == 0 || at[d] / 2 == J[d];
+      weights[d] = { w, w + other, parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
+    }
+    else
+    {
+      weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 1.f, 0.f };
+    }
+  }
+}
+
 void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
-  const float* v, int along, float* out, const ParallelFor& parallelFor) const
+  const float* v, const std::uint8_t* kept, int along, float* out,
+  const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = C.dims;
@@ -578,18 +693,10 @@ void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Diff
       float* own = store.data() + 2;
       float* next = own + n[0] + 4;
       const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-      int first[3];
-      int last[3];
-      for (int d = 1; d < 3; ++d)
+      const Footprint rows = this->footprint(fine, n, J, along);
+      for (int k = rows.first[2]; k <= rows.last[2]; ++k)
       {
-        first[d] = !fine.halved[d] ? J[d] : d == along ? 2 * J[d] + 1 : std::max(0, 2 * J[d] - 1);
-        last[d] = !fine.halved[d] ? J[d]
-          : d == along            ? std::min(2 * J[d] + 1, n[d] - 1)
-                                  : std::min(2 * J[d] + 2, n[d] - 1);
-      }
-      for (int k = first[2]; k <= last[2]; ++k)
-      {
-        for (int j = first[1]; j <= last[1]; ++j)
+        for (int j = rows.first[1]; j <= rows.last[1]; ++j)
         {
           const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
           if (span.begin >= span.end)
@@ -598,25 +705,12 @@ void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Diff
           }
           const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
           const int at[3] = { 0, j, k };
-          // a line's weights are the mean of those at its two ends
+          // a face's weights are the mean of those at its two ends
           const bool ends = along >= 0 && at[along] + 1 < n[along];
-          const std::int64_t other = ends ? stride[along] : 0;
           Weights weights[3];
-          for (int d = 0; d < 3; ++d)
-          {
-            if (fine.halved[d] && d != along)
-            {
-              const std::uint8_t* w = fine.w[d].data() + f;
-              const bool parent = d == 0 || at[d] / 2 == J[d];
-              weights[d] = { w, w + other, parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
-            }
-            else
-            {
-              weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 1.f, 0.f };
-            }
-          }
-          gatherRow(span.end - span.begin, v + f, weights[0], weights[1], weights[2],
-            own + span.begin, next + span.begin);
+          this->weigh(fine, at, J, f, along, ends ? stride[along] : 0, weights);
+          gatherRow(span.end - span.begin, v + f, kept ? kept + f : nullptr, weights[0], weights[1],
+            weights[2], own + span.begin, next + span.begin);
         }
       }
       const int begin = static_cast<int>(o - row * nc[0]);
@@ -624,6 +718,84 @@ void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Diff
       {
         out[row * nc[0] + i] =
           fine.halved[0] ? own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2] : own[i];
+      }
+    });
+}
+
+void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
+  const DiffusionOperator& C, int along, float* out, const ParallelFor& parallelFor) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const std::array<int, 3>& nc = C.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  constexpr float noResistance = 1e20f; // of the inner face of a voxel that is its own centre
+  ForEachRow(C, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int length)
+    {
+      static thread_local std::vector<float> store;
+      const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
+      store.assign(9 * room, 0.f);
+      float* own = store.data() + 2;
+      float* next = own + 3 * room;
+      float* masked = next + 3 * room;
+      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+      const Footprint rows = this->footprint(fine, n, J, along);
+      for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+      {
+        for (int j = rows.first[1]; j <= rows.last[1]; ++j)
+        {
+          const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+          const int at[3] = { 0, j, k };
+          if (span.begin >= span.end || (along > 0 && at[along] + 1 >= n[along]))
+          {
+            continue;
+          }
+          const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
+          Weights weights[3];
+          this->weigh(fine, at, J, f, along, stride[along], weights);
+          const float* g = A.g[along].data() + f;
+          const float* between = g;
+          const float* below = g - stride[along];
+          const float* above = g + stride[along];
+          const int count = span.end - span.begin;
+          if (along == 0)
+          {
+            // only the faces after odd voxels lie between coarse ones
+            for (int i = 0; i < count; ++i)
+            {
+              const int x = span.begin + i;
+              const float face = (x & 1) && x + 1 < n[0] ? 1.f : 0.f;
+              masked[i] = face * g[i];
+              masked[i + room] = face * g[i - 1];
+              masked[i + 2 * room] = x + 2 < n[0] ? face * g[i + 1] : face * noResistance;
+            }
+            between = masked;
+            below = masked + room;
+            above = masked + 2 * room;
+          }
+          else if (at[along] + 2 >= n[along])
+          {
+            std::fill(masked, masked + count, noResistance);
+            above = masked;
+          }
+          gatherFacesRow(count, between, below, above, weights[0], weights[1], weights[2],
+            own + span.begin, next + span.begin, room);
+        }
+      }
+      // the lines of a coarse face mix between the faces: sums in series (an upper bound, which
+      // keeps bent corridors open; straight lines in parallel would be a lower one)
+      const int begin = static_cast<int>(o - row * nc[0]);
+      for (int i = begin; i < begin + length; ++i)
+      {
+        float sum[3];
+        for (int s = 0; s < 3; ++s)
+        {
+          const float* p = own + static_cast<std::size_t>(s) * room;
+          const float* q = next + static_cast<std::size_t>(s) * room;
+          sum[s] = fine.halved[0] ? p[2 * i] + p[2 * i + 1] + q[2 * i - 1] + q[2 * i + 2] : p[i];
+        }
+        const bool open = sum[0] > 1e-25f && sum[1] > 1e-25f && sum[2] > 1e-25f;
+        out[row * nc[0] + i] = open ? 1.f / (0.5f / sum[1] + 1.f / sum[0] + 0.5f / sum[2]) : 0.f;
       }
     });
 }
@@ -678,7 +850,7 @@ void Multigrid::prolong(const DiffusionOperator& A, const Level& fine, const Lev
         up[c] = u + begin;
         side[c] = s + begin;
       }
-      prolongRow(length, w[0], w[1], w[2], up, side, x + o);
+      prolongRow(length, w[0], w[1], w[2], fine.kept.data() + o, up, side, x + o);
     });
 }
 
@@ -731,7 +903,7 @@ void Multigrid::cycle(
     ForEachRow(A, parallelFor,
       [&](std::int64_t row, std::int64_t o, int n)
       { residualRow(n, facesOfRow(A, row, o), viewRow(A, x, row, o), b + o, r + o); });
-    this->gather(A, fine, coarse.A, r, -1, coarse.b.data(), parallelFor);
+    this->gather(A, fine, coarse.A, r, fine.kept.data(), -1, coarse.b.data(), parallelFor);
     this->cycle(l + 1, coarse.b.data(), coarse.x.data(), true, parallelFor);
     this->prolong(A, fine, coarse, x, parallelFor);
   }
@@ -750,8 +922,8 @@ void Multigrid::fullCycle(const float* b, float* x, const ParallelFor& parallelF
   const auto field = [&](std::size_t l) { return l == 0 ? x : this->levels[l].x.data(); };
   for (std::size_t l = 0; l < last; ++l)
   {
-    this->gather(this->operatorOf(l), this->levels[l], this->levels[l + 1].A, rhs(l), -1,
-      this->levels[l + 1].b.data(), parallelFor);
+    this->gather(this->operatorOf(l), this->levels[l], this->levels[l + 1].A, rhs(l),
+      this->levels[l].kept.data(), -1, this->levels[l + 1].b.data(), parallelFor);
   }
   this->cycle(last, rhs(last), field(last), true, parallelFor);
   for (std::size_t l = last; l-- > 0;)

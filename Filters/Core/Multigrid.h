@@ -16,13 +16,14 @@
  * The hierarchy follows the physics, not the algebra:
  *   1. Coarsening joins 2 voxels along each axis whose mean conductance is within
  *      a factor of the largest one (so strong anisotropy is semi-coarsened).
- *   2. A coarse face is a network of resistors: each line through it goes from
- *      centre to centre (half the inner face on either side, in series with the
- *      face between), and the lines stand in parallel. The coarse operator keeps
- *      seven points.
- *   3. The prolongation puts a voxel between its parent and its parent's
- *      neighbour by the balance of flux along the line that joins them; the
- *      restriction is its transpose.
+ *   2. A coarse face is a network of resistors from centre to centre: half the
+ *      inner faces on either side, in series with the faces between, those in
+ *      parallel. A voxel's faces go to the coarse columns that the voxel is put
+ *      between. The coarse operator keeps seven points.
+ *   3. The prolongation puts a voxel, along each axis, between its parent and its
+ *      parent's neighbour by the balance of flux along the line that joins them, and
+ *      lowers it by what its own sink takes; a coarse sink is what is felt of the
+ *      sinks through those lines. The restriction is the transpose.
  *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after
  *      the coarse correction, so that the cycle is symmetric and positive definite.
  *
@@ -104,6 +105,13 @@ void CloseIsolated(DiffusionOperator& A, float s, const ParallelFor& parallelFor
 /** y = A x and returns x . y; in float, with the sum in double. */
 double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor);
 
+/** (factor + slope (here + there)) is the weight of a voxel, or of a face, for a coarse row. */
+struct MultigridWeights
+{
+  const std::uint8_t *here, *there;
+  float factor, slope;
+};
+
 class Multigrid
 {
 public:
@@ -137,7 +145,9 @@ private:
     Buffer<float> r;     // residual, where there is a coarser level
     std::array<bool, 3> halved{ { false, false, false } };
     std::array<Buffer<std::uint8_t>, 3> w; // weight of the parent's neighbour, /255
-    Buffer<std::uint8_t> noWeight;         // a row of 0, along axes that are not halved
+    Buffer<std::uint8_t>
+      kept; // of what comes in along the lines, the part that no sink takes, /255
+    Buffer<std::uint8_t> noWeight; // a row of 0, along axes that are not halved
   };
   /** A cycle on level l; x is the start where `fromZero` is false. */
   void cycle(
@@ -149,12 +159,26 @@ private:
   void coarsen(
     const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const;
 
+  using Weights = MultigridWeights;
+  /** The fine rows, along y and z, that have to do with a coarse one. */
+  struct Footprint
+  {
+    int first[3], last[3];
+  };
+  Footprint footprint(
+    const Level& fine, const std::array<int, 3>& n, const int J[3], int along) const;
+  void weigh(const Level& fine, const int at[3], const int J[3], std::int64_t f, int along,
+    std::int64_t other, Weights weights[3]) const;
   /**
-   * out_C = sum over voxels f of P_fC v_f. `along` >= 0: v stands on the faces
-   * along that axis, and a line counts for the coarse face that it crosses.
+   * out_C = sum over voxels f of P_fC v_f (kept is P's part for the sinks). `along` >= 0: v
+   * stands on the faces along that axis, which is not halved.
    */
   void gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
-    const float* v, int along, float* out, const ParallelFor& parallelFor) const;
+    const float* v, const std::uint8_t* kept, int along, float* out,
+    const ParallelFor& parallelFor) const;
+  /** The coarse faces along an axis that is halved, see 2. above. */
+  void gatherFaces(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
+    int along, float* out, const ParallelFor& parallelFor) const;
   /** x += P coarse.x */
   void prolong(const DiffusionOperator& A, const Level& fine, const Level& coarse, float* x,
     const ParallelFor& parallelFor) const;

@@ -94,7 +94,8 @@ void hardMedia(Suite& suite)
       });
     scene.sigma_a.assign(scene.q.size(), 1e-4);
     scene.q[index(scene, 1, 1, 1)] = 1.;
-    expectSolved(suite, "labyrinth", scene, 200);
+    expectSolved(
+      suite, "labyrinth", scene, 200); // two corridors in one coarse voxel: the hard case
   }
   for (const double ratio : { 10., 1000. })
   {

@@ -1,0 +1,209 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/** Only what the scene requires: active regions, named errors, budgets, cancelling. */
+#include "DiffusionScene.h"
+#include "LightTransportTesting.h"
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <thread>
+
+using namespace lighttransport;
+using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::Suite;
+
+namespace
+{
+std::size_t index(const DiffusionScene& scene, int i, int j, int k)
+{
+  return static_cast<std::size_t>(scene.grid.index(i, j, k));
+}
+
+/** 95th percentile of |phi - exact| / |exact| within six decades of the largest. */
+double percentile(const std::vector<double>& phi, const std::vector<double>& exact)
+{
+  double largest = 0.;
+  for (const double v : exact)
+  {
+    largest = std::max(largest, std::abs(v));
+  }
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < phi.size(); ++i)
+  {
+    if (std::abs(exact[i]) >= 1e-6 * largest)
+    {
+      errors.push_back(std::abs(phi[i] - exact[i]) / std::abs(exact[i]));
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors[errors.size() * 95 / 100];
+}
+
+/** A bent tube in absorbing tissue. */
+DiffusionScene tube(int n, double wall)
+{
+  DiffusionScene scene({ { n, n, n } }, { { 1., 1., 1. } });
+  const auto inside = [n](double x, double y, double z)
+  {
+    const double cy = n * (0.5 + 0.2 * std::sin(x * 6. / n));
+    const double cz = n * (0.5 + 0.2 * std::cos(x * 6. / n));
+    return std::hypot(y - cy, z - cz) < 2.5;
+  };
+  scene.fill(scene.D, [&](double x, double y, double z) { return inside(x, y, z) ? 1. : wall; });
+  scene.fill(scene.sigma_a,
+    [&](double x, double y, double z) { return inside(x, y, z) ? 1e-3 : 1. - wall; });
+  scene.fill(scene.q,
+    [&](double x, double y, double z)
+    {
+      return std::hypot(x - n * 0.4,
+               std::hypot(
+                 y - n * (0.5 + 0.2 * std::sin(2.4)), z - n * (0.5 + 0.2 * std::cos(2.4)))) < 2.
+        ? 1.
+        : 0.;
+    });
+  return scene;
+}
+
+void activeRegion(Suite& suite)
+{
+  for (const double sign : { 1., -1. })
+  {
+    DiffusionScene full = tube(96, 1e-4);
+    full.q[index(full, 30, 48, 70)] = sign; // somewhere else, of either sign
+    DiffusionScene active = full;
+    const DiffusionReport whole = full.solve(1e-9);
+    DiffusionSolver solver;
+    DiffusionControl control;
+    control.tolerance = 1e-9;
+    const DiffusionReport report =
+      solver.solveActive(active.medium(), active.q.data(), active.phi.data(), control, 1e-7);
+    const double error = percentile(active.phi, full.phi);
+    std::cout << "tube: " << report.activeFraction << " of the voxels, " << report.fineApplications
+              << " instead of " << whole.fineApplications << " full applications, error " << error
+              << ", leaked " << report.leaked << "\n";
+    LT_CHECK(suite, report.reason == StopReason::Converged);
+    LT_CHECK(suite, report.activeFraction < 0.25);
+    LT_CHECK(suite, report.fineApplications < 0.5 * whole.fineApplications);
+    LT_CHECK(suite, error < 1e-2);
+    LT_CHECK_NEAR(
+      suite, report.absorbed + report.escaped + report.leaked - report.emitted, 0., 1e-6);
+    LT_CHECK(suite, std::abs(report.leaked) < 1e-4);
+    LT_CHECK(suite, report.bytes < whole.bytes / 2);
+    // flux is defined everywhere
+    std::vector<double> E(3 * active.phi.size(), 7.);
+    solver.flux(active.phi.data(), E.data());
+    LT_CHECK(suite, E[0] == 0. && E[1] == 0. && E[2] == 0.);
+  }
+  {
+    // light that fills the volume: the full solve, and little lost on the way there
+    DiffusionScene full({ { 48, 48, 48 } }, { { 1., 1., 1. } });
+    full.sigma_a.assign(full.q.size(), 1e-4);
+    full.q[index(full, 24, 24, 24)] = 1.;
+    DiffusionScene active = full;
+    const DiffusionReport whole = full.solve(1e-8);
+    DiffusionSolver solver;
+    DiffusionControl control;
+    const DiffusionReport report =
+      solver.solveActive(active.medium(), active.q.data(), active.phi.data(), control);
+    std::cout << "open: " << report.fineApplications << " instead of " << whole.fineApplications
+              << "\n";
+    LT_CHECK(suite, report.reason == StopReason::Converged && report.activeFraction == 1.);
+    LT_CHECK(suite, report.fineApplications < 1.2 * whole.fineApplications);
+    LT_CHECK_NEAR(suite, percentile(active.phi, full.phi), 0., 1e-4);
+  }
+  {
+    // nowhere to go, no light, bad input: as the full solve
+    DiffusionScene scene({ { 40, 8, 8 } }, { { 1., 1., 1. } });
+    DiffusionSolver solver;
+    DiffusionControl control;
+    DiffusionReport report =
+      solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite, report.reason == StopReason::Converged);
+    scene.boundary = Boundary::ZeroFlux;
+    scene.q[7] = 1.;
+    report = solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite, report.reason == StopReason::NoSteadyState);
+    scene.D[2000] = -1.;
+    report = solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite, report.reason == StopReason::BadInput);
+  }
+}
+
+/** The error that was named is met, and the estimate is near the truth. */
+void targetError(Suite& suite)
+{
+  std::mt19937 random(31);
+  std::uniform_real_distribution<double> uniform(0., 1.);
+  std::cout << "seed 31\n";
+  int met = 0;
+  int near = 0;
+  int all = 0;
+  for (int kind = 0; kind < 4; ++kind)
+  {
+    DiffusionScene scene = tube(40, kind % 2 ? 1e-2 : 1e-4);
+    if (kind >= 2)
+    {
+      for (double& D : scene.D)
+      {
+        D *= std::pow(10., -uniform(random));
+      }
+      scene.sigma_a.assign(scene.q.size(), kind == 2 ? 1e-2 : 1e-3);
+    }
+    DiffusionScene exact = scene;
+    exact.solve(1e-12);
+    DiffusionSolver solver;
+    solver.setMedium(scene.medium());
+    for (const double target : { 0.1, 0.03, 0.01, 1e-3 })
+    {
+      DiffusionControl control;
+      control.tolerance = 1e-12;
+      control.targetError = target;
+      scene.phi.assign(scene.phi.size(), 0.);
+      const DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+      const double error = percentile(scene.phi, exact.phi);
+      std::cout << "kind " << kind << ", target " << target << ": " << report.iterations
+                << " iterations, error " << error << ", estimated " << report.estimatedError
+                << "\n";
+      LT_CHECK(suite, report.reason == StopReason::Converged);
+      ++all;
+      met += error <= target;
+      near += report.estimatedError >= error / 3. && report.estimatedError <= error * 3.;
+    }
+  }
+  std::cout << met << " of " << all << " targets met, " << near << " estimates within 3\n";
+  LT_CHECK(suite, met >= 0.9 * all);
+  LT_CHECK(suite, near >= 0.9 * all);
+}
+
+void budget(Suite& suite)
+{
+  DiffusionScene scene = tube(48, 1e-6);
+  DiffusionSolver solver;
+  solver.setMedium(scene.medium());
+  DiffusionControl control;
+  control.timeBudget = 1e-6;
+  DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::MaxIterations);
+  LT_CHECK(suite, report.message.find("budget") != std::string::npos);
+  LT_CHECK(suite, report.estimatedError > 0. && report.iterations >= 1);
+
+  int shown = 0;
+  control.timeBudget = 0.;
+  control.intermediateInterval = 0.;
+  control.intermediate = [&](const double* phi) { shown += std::isfinite(phi[0]) ? 1 : 0; };
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, shown >= report.iterations - 1 && shown > 2);
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  Suite suite(argc, argv);
+  Suite::trapFloatingPoint();
+  activeRegion(suite);
+  targetError(suite);
+  budget(suite);
+  return suite.result();
+}
