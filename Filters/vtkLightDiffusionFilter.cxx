@@ -173,7 +173,9 @@ void vtkLightDiffusionFilter::ClearReport()
   this->SolveSeconds = 0.;
   this->Bytes = 0;
   this->FineGridApplications = 0.;
-  this->EmittedPower = this->AbsorbedPower = this->EscapedPower = 0.;
+  this->EmittedPower = this->AbsorbedPower = this->EscapedPower = this->LeakedPower = 0.;
+  this->EstimatedError = this->EstimatedErrorL2 = -1.;
+  this->ActiveFraction = 1.;
   this->PositivityBound = this->StabilityBound = this->UsedTimeStep = 0.;
   this->ComputedGradientScale = 0.;
 }
@@ -252,6 +254,25 @@ bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
   {
     text << "GradientScale is " << this->GradientScale
          << "; expected a number >= 0 (0: chosen from the data)";
+  }
+  else if (!std::isfinite(this->ActiveThreshold) || this->ActiveThreshold <= 0. ||
+    this->ActiveThreshold >= 1.)
+  {
+    text << "ActiveThreshold is " << this->ActiveThreshold << "; expected a number in (0, 1)";
+  }
+  else if (!std::isfinite(this->TargetError) || this->TargetError < 0. || this->TargetError >= 1.)
+  {
+    text << "TargetError is " << this->TargetError
+         << "; expected a number in [0, 1) (0: Tolerance)";
+  }
+  else if (!std::isfinite(this->TimeBudget) || this->TimeBudget < 0.)
+  {
+    text << "TimeBudget is " << this->TimeBudget << "; expected seconds >= 0 (0: no limit)";
+  }
+  else if (!std::isfinite(this->IntermediateInterval) || this->IntermediateInterval < 0.)
+  {
+    text << "IntermediateInterval is " << this->IntermediateInterval
+         << "; expected seconds >= 0 (0: never)";
   }
   else if (this->OutputPrecision != SINGLE_PRECISION && this->OutputPrecision != DOUBLE_PRECISION &&
     this->OutputPrecision != DEFAULT_PRECISION)
@@ -503,14 +524,12 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   key.boundary = this->Boundary;
   key.refractiveIndexRatio = this->RefractiveIndexRatio;
   key.moment = moment;
-  double setupSeconds = 0.;
-  if (!kept.valid || !(key == kept.key))
+  // With a named error the region is the filter's choice too.
+  const bool active = this->Mode == Steady && !anisotropic &&
+    (this->ActiveRegion || this->TargetError > 0. || this->TimeBudget > 0.);
+  const auto withMedium = [&](auto&& action) -> DiffusionReport
   {
-    kept.valid = false;
-    kept.phi.release();
-    kept.moment.reset(
-      moment ? new lighttransport::FirstMomentSolver(vtkLightTransportParallelFor()) : nullptr);
-    const auto build = [&](auto zero, const auto* d, const auto* s)
+    const auto act = [&](auto zero, const auto* d, const auto* s) -> DiffusionReport
     {
       lighttransport::DiffusionMedium<decltype(zero)> medium;
       medium.grid.dims = { { key.dims[0], key.dims[1], key.dims[2] } };
@@ -520,22 +539,28 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       medium.outside = outside.empty() ? nullptr : outside.data();
       medium.boundary = static_cast<lighttransport::Boundary>(this->Boundary);
       medium.refractiveIndexRatio = this->RefractiveIndexRatio;
-      return moment ? kept.moment->setMedium(medium) : kept.solver.setMedium(medium);
+      return action(medium);
     };
-    DiffusionReport report;
     if (D->GetDataType() == VTK_FLOAT && (!sigma_a || sigma_a->GetDataType() == VTK_FLOAT))
     {
       std::vector<float> unused;
-      report = build(0.f, valuesOf<float, vtkFloatArray>(D, unused),
+      return act(0.f, valuesOf<float, vtkFloatArray>(D, unused),
         sigma_a ? valuesOf<float, vtkFloatArray>(sigma_a, unused) : nullptr);
     }
-    else
-    {
-      std::vector<double> storeD;
-      std::vector<double> storeSigma;
-      report = build(0., valuesOf<double, vtkDoubleArray>(D, storeD),
-        sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, storeSigma) : nullptr);
-    }
+    std::vector<double> storeD;
+    std::vector<double> storeSigma;
+    return act(0., valuesOf<double, vtkDoubleArray>(D, storeD),
+      sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, storeSigma) : nullptr);
+  };
+  double setupSeconds = 0.;
+  if (!active && (!kept.valid || !(key == kept.key)))
+  {
+    kept.valid = false;
+    kept.phi.release();
+    kept.moment.reset(
+      moment ? new lighttransport::FirstMomentSolver(vtkLightTransportParallelFor()) : nullptr);
+    const DiffusionReport report = withMedium([&](const auto& medium)
+      { return moment ? kept.moment->setMedium(medium) : kept.solver.setMedium(medium); });
     if (report.reason != lighttransport::StopReason::Converged)
     {
       problem = report.message;
@@ -550,7 +575,12 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
 
   // 3. solve
   lighttransport::Buffer<double> phi;
-  if (this->Continue && kept.phi.size() == size)
+  if (active)
+  {
+    phi.allocate(size);
+    kept.valid = false; // the operator becomes the region's
+  }
+  else if (this->Continue && kept.phi.size() == size)
   {
     phi = std::move(kept.phi);
   }
@@ -579,6 +609,28 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     this->UpdateProgress(fraction);
     return !vtkLightTransportCheckAbort(this);
   };
+  control.targetError = this->TargetError;
+  control.timeBudget = this->TimeBudget;
+  if (this->IntermediateInterval > 0.)
+  {
+    control.intermediateInterval = this->IntermediateInterval;
+    control.intermediate = [this, input, size](const double* reached)
+    {
+      vtkNew<vtkFloatArray> array;
+      array->SetName(names::Fluence);
+      array->SetNumberOfTuples(size);
+      std::transform(reached, reached + size, array->GetPointer(0),
+        [](double value)
+        {
+          const double limit = static_cast<double>(std::numeric_limits<float>::max());
+          return static_cast<float>(std::min(limit, std::max(-limit, value)));
+        });
+      this->IntermediateOutput = vtkSmartPointer<vtkImageData>::New();
+      this->IntermediateOutput->CopyStructure(input);
+      this->IntermediateOutput->GetPointData()->SetScalars(array);
+      this->InvokeEvent(IntermediateEvent);
+    };
+  }
   const bool local = this->LocalTimeStep && this->Mode == Explicit;
   const double bound = moment ? kept.moment->courantBound() : this->PositivityBound;
   this->UsedTimeStep = this->Mode == Steady || local ? 0.
@@ -596,6 +648,11 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     {
       return kept.solver.stepLocal(
         q, phi.data(), this->NumberOfSteps, this->CourantNumber, control);
+    }
+    if (active)
+    {
+      return withMedium([&](const auto& medium)
+        { return kept.solver.solveActive(medium, q, phi.data(), control, this->ActiveThreshold); });
     }
     switch (this->Mode)
     {
@@ -628,6 +685,10 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   this->EmittedPower = report.emitted;
   this->AbsorbedPower = report.absorbed;
   this->EscapedPower = report.escaped;
+  this->LeakedPower = report.leaked;
+  this->EstimatedError = report.estimatedError;
+  this->EstimatedErrorL2 = report.estimatedErrorL2;
+  this->ActiveFraction = report.activeFraction;
 
   const bool usable = this->StopReason == Converged || this->StopReason == MaxIterations ||
     this->StopReason == Breakdown || this->StopReason == Cancelled;
@@ -640,7 +701,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
   const bool stepsDone = this->Mode != Steady && this->StopReason == MaxIterations &&
     (this->Mode == Explicit || report.message.empty());
-  if (this->StopReason == Breakdown || (this->StopReason == MaxIterations && !stepsDone))
+  const bool asAsked = stepsDone || (this->TimeBudget > 0. && this->EstimatedError >= 0.);
+  if (this->StopReason == Breakdown || (this->StopReason == MaxIterations && !asAsked))
   {
     vtkWarningMacro(<< this->GetStopReasonAsString() << " after " << this->NumberOfIterationsUsed
                     << " iterations: the relative residual is " << this->Residual
@@ -791,6 +853,10 @@ void vtkLightDiffusionFilter::WriteReport(vtkImageData* output) const
   number("EmittedPower", this->EmittedPower);
   number("AbsorbedPower", this->AbsorbedPower);
   number("EscapedPower", this->EscapedPower);
+  number("LeakedPower", this->LeakedPower);
+  number("ActiveFraction", this->ActiveFraction);
+  number("EstimatedError", this->EstimatedError);
+  number("EstimatedErrorL2", this->EstimatedErrorL2);
 }
 
 //------------------------------------------------------------------------------
@@ -830,6 +896,15 @@ void vtkLightDiffusionFilter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "EmittedPower: " << this->EmittedPower << "\n";
   os << indent << "AbsorbedPower: " << this->AbsorbedPower << "\n";
   os << indent << "EscapedPower: " << this->EscapedPower << "\n";
+  os << indent << "LeakedPower: " << this->LeakedPower << "\n";
+  os << indent << "ActiveRegion: " << this->ActiveRegion << "\n";
+  os << indent << "ActiveThreshold: " << this->ActiveThreshold << "\n";
+  os << indent << "ActiveFraction: " << this->ActiveFraction << "\n";
+  os << indent << "TargetError: " << this->TargetError << "\n";
+  os << indent << "TimeBudget: " << this->TimeBudget << "\n";
+  os << indent << "EstimatedError: " << this->EstimatedError << "\n";
+  os << indent << "EstimatedErrorL2: " << this->EstimatedErrorL2 << "\n";
+  os << indent << "IntermediateInterval: " << this->IntermediateInterval << "\n";
   os << indent << "PositivityBound: " << this->PositivityBound << "\n";
   os << indent << "StabilityBound: " << this->StabilityBound << "\n";
   os << indent << "UsedTimeStep: " << this->UsedTimeStep << "\n";

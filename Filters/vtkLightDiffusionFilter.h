@@ -67,6 +67,7 @@
 
 #include "vtkImageAlgorithm.h"
 #include "vtkLightTransportFiltersModule.h" // for the export macro
+#include "vtkSmartPointer.h"                // for the intermediate output
 
 #include <memory> // for the solver's state
 #include <string> // for the report's message
@@ -252,6 +253,57 @@ public:
 
   ///@{
   /**
+   * Steady only: solve on tiles around the sources, grown while more than ActiveThreshold (of the
+   * largest |phi|) stands at their border, with phi = 0 beyond: light that stays in a vessel does
+   * not cost the whole volume; light that fills a quarter of it is solved on the whole, for a few
+   * percent more. Fluence is 0 outside. Default off: the residual's equations hold everywhere.
+   */
+  vtkSetMacro(ActiveRegion, bool);
+  vtkGetMacro(ActiveRegion, bool);
+  vtkBooleanMacro(ActiveRegion, bool);
+  ///@}
+
+  ///@{
+  /** In (0, 1); default 1e-7: an order below the six decades that are shown. */
+  vtkSetMacro(ActiveThreshold, double);
+  vtkGetMacro(ActiveThreshold, double);
+  ///@}
+
+  ///@{
+  /**
+   * The error that is accepted, in [0, 1): the 95th percentile of |phi - phi*| / |phi*| over the
+   * voxels within six decades of the largest |phi*|, with phi* the exact solution of the discrete
+   * equations. Where above 0, a steady solve chooses its region and its last iteration by it and
+   * GetEstimatedError tells what was reached; Tolerance only ends it earlier. Default 0: Tolerance
+   * decides.
+   */
+  vtkSetMacro(TargetError, double);
+  vtkGetMacro(TargetError, double);
+  ///@}
+
+  ///@{
+  /**
+   * Seconds after which a steady solve gives its best answer, with an estimate of its error; the
+   * stop reason is then MaxIterations. >= 0; default 0: no limit. At least one iteration is made.
+   */
+  vtkSetMacro(TimeBudget, double);
+  vtkGetMacro(TimeBudget, double);
+  ///@}
+
+  /** Invoked with the field that was reached, see IntermediateInterval. */
+  static constexpr unsigned long IntermediateEvent = 1000 + 5311; // vtkCommand::UserEvent is 1000
+  ///@{
+  /**
+   * Progressive display: where above 0, IntermediateEvent is invoked during a solve at most once
+   * per so many seconds, and GetIntermediateOutput holds the Fluence reached. Default 0: never.
+   */
+  vtkSetMacro(IntermediateInterval, double);
+  vtkGetMacro(IntermediateInterval, double);
+  vtkImageData* GetIntermediateOutput() { return this->IntermediateOutput; }
+  ///@}
+
+  ///@{
+  /**
    * Of Fluence and Flux: vtkAlgorithm::SINGLE_PRECISION (float, default) or DOUBLE_PRECISION.
    * The solution is in double; a value beyond float's range is an error that says so.
    */
@@ -289,12 +341,22 @@ public:
   vtkGetMacro(Bytes, vtkIdType);
   /** Applications of the operator on the full grid, or sweeps that cost as much. */
   vtkGetMacro(FineGridApplications, double);
+  /**
+   * The error as TargetError defines it, and the relative Euclidean norm, both estimated from the
+   * last iteration; negative where neither TargetError nor TimeBudget is set.
+   */
+  vtkGetMacro(EstimatedError, double);
+  vtkGetMacro(EstimatedErrorL2, double);
+  /** The part of the voxels that was solved for; 1 without an active region. */
+  vtkGetMacro(ActiveFraction, double);
   ///@}
   ///@{
   /** Power: the integrals of q, of sigma_a phi, and of the flux through the border. */
   vtkGetMacro(EmittedPower, double);
   vtkGetMacro(AbsorbedPower, double);
   vtkGetMacro(EscapedPower, double);
+  /** What left an active region: the power that its border costs. */
+  vtkGetMacro(LeakedPower, double);
   ///@}
   ///@{
   /** Of the medium of the last execution, c dt as a length: up to which an explicit step keeps
@@ -343,6 +405,12 @@ private:
   double ComputedGradientScale = 0.;
   bool ComputeFlux = false;
   bool Continue = false;
+  bool ActiveRegion = false;
+  double ActiveThreshold = 1e-7;
+  double TargetError = 0.;
+  double TimeBudget = 0.;
+  double IntermediateInterval = 0.;
+  vtkSmartPointer<vtkImageData> IntermediateOutput;
   int OutputPrecision = SINGLE_PRECISION;
 
   int StopReason = BadInput;
@@ -355,6 +423,10 @@ private:
   double EmittedPower = 0.;
   double AbsorbedPower = 0.;
   double EscapedPower = 0.;
+  double LeakedPower = 0.;
+  double EstimatedError = -1.;
+  double EstimatedErrorL2 = -1.;
+  double ActiveFraction = 1.;
   double PositivityBound = 0.;
   double StabilityBound = 0.;
   double UsedTimeStep = 0.;

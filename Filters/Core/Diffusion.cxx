@@ -1270,13 +1270,19 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
       }
       activeSize += span.end - span.begin;
     }
+    DiffusionControl rest = control;
+    if (control.timeBudget > 0.)
+    {
+      rest.timeBudget = std::max(1e-6, control.timeBudget - (now() - began));
+      last = last || now() - began > 0.5 * control.timeBudget;
+    }
     // Light that fills the volume is better solved on the volume.
     if (4 * activeSize > size)
     {
       this->assemble(medium, {});
       const int before = report.iterations;
       const double applications = report.fineApplications;
-      report = this->solveSteady(q, phi, control);
+      report = this->solveSteady(q, phi, rest);
       report.iterations += before;
       report.fineApplications += applications;
       break;
@@ -1289,7 +1295,7 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
     }
     const RightHandSide<Q> b{ q, 1. / this->scale };
     report.leaked = 0.;
-    this->conjugateGradients(b, phi, last ? control : rough, 0., last ? 1. : 0., report);
+    this->conjugateGradients(b, phi, last ? rest : rough, 0., last ? 1. : 0., report);
     spent += report.fineApplications * static_cast<double>(activeSize) / static_cast<double>(size);
     report.fineApplications = 0.;
     if (report.reason != StopReason::Converged && report.reason != StopReason::MaxIterations)
@@ -1352,7 +1358,7 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
       }
     }
     report.leaked = leaked * this->box.voxelVolume();
-    if (any)
+    if (any && !(control.timeBudget > 0. && last))
     {
       last = false;
     }

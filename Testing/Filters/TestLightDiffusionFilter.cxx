@@ -447,6 +447,75 @@ void progress(Suite& suite)
   LT_CHECK(suite, filter->GetNumberOfIterationsUsed() > 0 && before > 0);
 }
 
+/** Only what the scene requires, through the filter. */
+void frugal(Suite& suite)
+{
+  // a rod of tissue in absorbing walls
+  auto image = makeImage(64, 40, 40, VTK_UNSIGNED_CHAR, [](int, int, int) { return 0.; });
+  const auto inside = [](int j, int k) { return std::hypot(j - 20., k - 20.) < 3.; };
+  addArray<vtkFloatArray>(
+    image, "DiffusionCoefficient", [&](int, int j, int k) { return inside(j, k) ? 1. : 1e-4; });
+  addArray<vtkFloatArray>(
+    image, "Absorption", [&](int, int j, int k) { return inside(j, k) ? 0.1 : 1.; });
+  addArray<vtkFloatArray>(
+    image, "Source", [](int i, int j, int k) { return i == 20 && j == 20 && k == 20 ? 1. : 0.; });
+  vtkNew<Filter> full;
+  full->SetInputData(image);
+  full->Update();
+  vtkNew<Filter> active;
+  active->SetInputData(image);
+  active->ActiveRegionOn();
+  active->ComputeFluxOn();
+  active->Update();
+  LT_CHECK(suite, active->GetStopReason() == Filter::Converged);
+  LT_CHECK(suite, active->GetActiveFraction() < 0.25 && full->GetActiveFraction() == 1.);
+  LT_CHECK(suite, active->GetFineGridApplications() < full->GetFineGridApplications());
+  LT_CHECK(suite, active->GetEstimatedError() < 0.);
+  for (const int i : { 20, 24, 30, 36 })
+  {
+    LT_CHECK_CLOSE(suite, fluenceAt(active, i, 20, 20), fluenceAt(full, i, 20, 20), 1e-3);
+  }
+  LT_CHECK(suite, fluenceAt(active, 60, 2, 2) == 0.);
+  LT_CHECK_NEAR(suite,
+    active->GetAbsorbedPower() + active->GetEscapedPower() + active->GetLeakedPower(), 1., 1e-5);
+  // and back
+  active->ActiveRegionOff();
+  active->Update();
+  LT_CHECK(suite, fluenceAt(active, 60, 2, 2) == fluenceAt(full, 60, 2, 2));
+
+  active->SetTargetError(0.01);
+  active->Update();
+  LT_CHECK(suite, active->GetStopReason() == Filter::Converged);
+  LT_CHECK(suite, active->GetEstimatedError() > 0. && active->GetEstimatedError() <= 0.01);
+  LT_CHECK_CLOSE(suite, fluenceAt(active, 30, 20, 20), fluenceAt(full, 30, 20, 20), 0.02);
+  LT_CHECK(suite, active->GetNumberOfIterationsUsed() > 0);
+  vtkNew<MessageLog> warnings;
+  active->AddObserver(vtkCommand::WarningEvent, warnings);
+  active->SetTargetError(0.);
+  active->SetTimeBudget(1e-9);
+  active->Update();
+  LT_CHECK(suite, active->GetStopReason() == Filter::MaxIterations);
+  LT_CHECK(suite, active->GetEstimatedError() > 0. && warnings->messages.empty());
+
+  class Show : public vtkCommand
+  {
+  public:
+    static Show* New() { return new Show; }
+    void Execute(vtkObject* caller, unsigned long, void*) override
+    {
+      auto* shown = Filter::SafeDownCast(caller)->GetIntermediateOutput();
+      this->count += shown && shown->GetNumberOfPoints() == 64 * 40 * 40 &&
+        shown->GetPointData()->GetArray("Fluence");
+    }
+    int count = 0;
+  };
+  vtkNew<Show> show;
+  full->AddObserver(Filter::IntermediateEvent, show);
+  full->SetIntermediateInterval(1e-9);
+  full->Update();
+  LT_CHECK(suite, show->count >= 2);
+}
+
 void badInput(Suite& suite)
 {
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -575,6 +644,7 @@ int main(int argc, char* argv[])
   continuing(suite);
   anisotropicDiffusion(suite);
   progress(suite);
+  frugal(suite);
   badInput(suite);
   return suite.result();
 }
