@@ -77,9 +77,17 @@ std::string Fixed(double value, int decimals)
   return text;
 }
 
+// Three digits: for what is read, not computed with.
+std::string Rounded(double value)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
 std::string DescribeSpace(const Volume& volume)
 {
-  return volume.IsRAS ? "RAS " + volume.Unit : "world " + volume.Unit;
+  return (volume.IsRAS ? "RAS" : "world") + (volume.Unit == "unit" ? "" : " " + volume.Unit);
 }
 
 /** What is called world or voxel, in the volume's terms; outside: an Error with the bounds. */
@@ -370,6 +378,7 @@ Json DescribeParameters(const Options& o, const Look& look)
   p["view"] = o.View;
   p["tf"] = DescribeCurve(o.TransferFunction);
   p["camera"] = Json::List(o.Camera);
+  p["up"] = o.Up;
   p["size"] = Json::List(o.Size);
   p["decades"] = o.Decades;
   p["strength"] = o.Strength;
@@ -440,7 +449,7 @@ int Run(Options options)
   const double voxelVolume = spacing[0] * spacing[1] * spacing[2];
   progress.Say(Name(options.Input) + ": " + volume.Format + ", " + std::to_string(dims[0]) + " x " +
     std::to_string(dims[1]) + " x " + std::to_string(dims[2]) + " " +
-    scalars->GetDataTypeAsString() + ", spacing " + FormatPoint(spacing) + ", world is " +
+    scalars->GetDataTypeAsString() + ", spacing " + FormatPoint(spacing) + ", coordinates " +
     DescribeSpace(volume) + ", values " + FormatNumber(statistics.Minimum) + " to " +
     FormatNumber(statistics.Maximum));
   for (const std::string& note : volume.Notes)
@@ -473,7 +482,8 @@ int Run(Options options)
   if (options.Seeds.empty() && options.Strokes.empty() && options.Paint.empty())
   {
     Seed seed;
-    const std::array<double, 3> middle = WidestEvenRegion(volume, statistics);
+    std::string how;
+    const std::array<double, 3> middle = DefaultSeed(volume, statistics, how);
     seed.Center.IsVoxel = true;
     seed.Text = "@";
     for (int a = 0; a < 3; ++a)
@@ -483,7 +493,8 @@ int Run(Options options)
       seed.Text += (a ? "," : "") + FormatNumber(seed.Center.Position[a]);
     }
     options.Seeds.push_back(seed);
-    progress.Say("no --seed: one in the middle of the widest even region");
+    progress.Say("no --seed: one in " + how);
+    report["default_seed"] = how;
   }
   std::vector<PlacedSeed> seeds;
   for (const Seed& seed : options.Seeds)
@@ -530,8 +541,10 @@ int Run(Options options)
     { "transfer-gradient", vtkOpticalMediumFilter::FromTransferFunctionGradient }
   };
   medium->SetDiffusionMapping(mappings.at(look.Mapping));
-  medium->SetDiffusionFunction(
-    options.DiffusionCurve.empty() ? look.Opacity : MakeFunction(options.DiffusionCurve));
+  medium->SetDiffusionFunction(!options.DiffusionCurve.empty()
+      ? MakeFunction(options.DiffusionCurve)
+      : look.Passage ? look.Passage
+                     : look.Opacity);
   medium->SetDiffusionComplement(options.Complement);
   medium->SetGradientScale(options.GradientScale);
   // The noise is measured where the light starts.
@@ -667,8 +680,8 @@ int Run(Options options)
   const LitRegion region = FindLitRegion(volume, light, options.Coarsen, options.Threshold);
   const double litVolume = region.Voxels * voxelVolume;
   const bool millimetres = volume.Unit == "mm";
-  const std::string litText = millimetres ? FormatNumber(litVolume / 1000.) + " ml"
-                                          : FormatNumber(litVolume) + " " + volume.Unit + "^3";
+  const std::string litText = millimetres ? Rounded(litVolume / 1000.) + " ml"
+                                          : Rounded(litVolume) + " " + volume.Unit + "^3";
   progress.Say("lit region: " + litText + " (" + FormatNumber(region.Voxels) + " voxels) above " +
     FormatNumber(options.Threshold) + " of the maximum");
 
@@ -743,6 +756,7 @@ int Run(Options options)
       volume.Image->GetCenter(middle.data());
     }
     pictures.SetLight(light, middle);
+    const bool named = volume.Unit != "unit";
     std::vector<std::string> caption;
     for (const PlacedSeed& seed : seeds)
     {
@@ -754,8 +768,8 @@ int Run(Options options)
       }
     }
     caption.push_back("mapping " + look.Mapping +
-      (sigma > 0. ? " " + FormatNumber(sigma) + "/" + volume.Unit : "") + ", reach " +
-      FormatNumber(look.Reach) + " " + volume.Unit + "; lit: " + litText);
+      (sigma > 0. ? " " + Rounded(sigma) + (named ? "/" + volume.Unit : "") : "") + ", reach " +
+      Rounded(look.Reach) + (named ? " " + volume.Unit : "") + "; lit: " + litText);
     pictures.SetCaption(caption);
     for (const std::string& kind : options.Pictures)
     {

@@ -413,6 +413,10 @@ const std::vector<Option>& Table()
       "degrees from the front, towards the patient's left, and up; or "
       "front, back, left, right, top, bottom (default 35,20)",
       [](Options& o, S v) { o.Camera = ParseCamera("--camera", v); } },
+    { "--up", "AXIS", "world axis that points up: z (default), -z, y, -y, x or -x",
+      [](Options& o, S v) {
+        o.Up = ParseChoice("--up", v, { "z", "-z", "y", "-y", "x", "-x" });
+      } },
     { "--size", "WxH", "of a picture in pixels (default 960x720)",
       [](Options& o, S v)
       {

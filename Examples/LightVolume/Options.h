@@ -90,6 +90,7 @@ struct Options
   double LightOpacity = -1.;  // < 0: the preset's
   double TissueOpacity = -1.; // < 0: the preset's
   std::vector<double> Camera; // azimuth, elevation, zoom
+  std::string Up = "z";
   Curve TransferFunction;
   std::string Title;
   std::vector<std::string> Pictures = { "plain", "lit", "slices" };

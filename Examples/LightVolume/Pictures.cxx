@@ -267,22 +267,60 @@ void Pictures::Parts::PlaceCamera(const Options& options)
   const double elevation =
     vtkMath::RadiansFromDegrees(options.Camera.empty() ? 20. : options.Camera[1]);
   const double zoom = options.Camera.size() > 2 ? options.Camera[2] : 1.;
-  // The front is where a patient looks to (+y of RAS), elsewhere where y is small. Positive
-  // azimuth goes to the patient's left, and elsewhere to large x.
-  const double side = this->TheVolume->IsRAS ? -1. : 1.;
-  const double to[3] = { side * std::sin(azimuth) * std::cos(elevation),
-    -side * std::cos(azimuth) * std::cos(elevation), std::sin(elevation) };
+  // Up, and the front: where a patient looks to (+y of RAS), elsewhere where y is small; if y is
+  // up, where z is large. Positive azimuth goes to the patient's left, and elsewhere to the right.
+  const int vertical = options.Up.back() - 'x';
+  const double sign = options.Up[0] == '-' ? -1. : 1.;
+  double up[3] = { 0., 0., 0. };
+  up[vertical] = sign;
+  double front[3] = { 0., 0., 0. };
+  if (vertical == 1)
+  {
+    front[2] = 1.;
+  }
+  else
+  {
+    front[1] = this->TheVolume->IsRAS ? 1. : -1.;
+  }
+  double side[3];
+  vtkMath::Cross(up, front, side);
+  double to[3];
+  double viewUp[3];
+  for (int a = 0; a < 3; ++a)
+  {
+    const double level = std::cos(azimuth) * front[a] + std::sin(azimuth) * side[a];
+    to[a] = std::cos(elevation) * level + std::sin(elevation) * up[a];
+    viewUp[a] = std::cos(elevation) * up[a] - std::sin(elevation) * level;
+  }
+
+  // As near as all corners of the volume are seen; data rarely fills them, so a little nearer.
   double center[3];
   this->Shown->GetCenter(center);
-  double bounds[6];
-  this->Shown->GetBounds(bounds);
+  double right[3];
+  vtkMath::Cross(viewUp, to, right);
+  constexpr double angle = 24.;
+  const double high = std::tan(vtkMath::RadiansFromDegrees(angle / 2.));
+  const double wide = high * options.Size[0] / options.Size[1];
+  double distance = 0.;
+  int dims[3];
+  this->Shown->GetDimensions(dims);
+  for (int corner = 0; corner < 8; ++corner)
+  {
+    const double index[3] = { corner & 1 ? dims[0] - .5 : -.5, corner & 2 ? dims[1] - .5 : -.5,
+      corner & 4 ? dims[2] - .5 : -.5 };
+    double p[3];
+    this->Shown->TransformContinuousIndexToPhysicalPoint(index, p);
+    vtkMath::Subtract(p, center, p);
+    distance = std::max({ distance, std::abs(vtkMath::Dot(p, right)) / wide + vtkMath::Dot(p, to),
+      std::abs(vtkMath::Dot(p, viewUp)) / high + vtkMath::Dot(p, to) });
+  }
+  distance /= 1.05 * zoom;
   vtkCamera* camera = this->Scene->GetActiveCamera();
-  camera->SetViewAngle(24.);
+  camera->SetViewAngle(angle);
   camera->SetFocalPoint(center);
-  camera->SetPosition(center[0] + to[0], center[1] + to[1], center[2] + to[2]);
-  camera->SetViewUp(0., 0., 1.);
-  this->Scene->ResetCamera(bounds);
-  camera->Dolly(1.28 * zoom);
+  camera->SetPosition(
+    center[0] + distance * to[0], center[1] + distance * to[1], center[2] + distance * to[2]);
+  camera->SetViewUp(viewUp);
   this->Scene->ResetCameraClippingRange();
 }
 

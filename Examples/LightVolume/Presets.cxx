@@ -137,7 +137,7 @@ Look ChooseLook(const Volume& volume, const Statistics& s, const Options& option
   look.Color = vtkSmartPointer<vtkColorTransferFunction>::New();
   look.Opacity = vtkSmartPointer<vtkPiecewiseFunction>::New();
   const double range = s.Maximum > s.Minimum ? s.Maximum - s.Minimum : 1.;
-  const bool signedValues = s.Minimum < 0. && s.Maximum > 0. && -s.Minimum > .2 * s.Maximum;
+  const bool signedValues = s.IsSigned();
 
   look.Preset = options.Preset;
   if (look.Preset == "auto")
@@ -194,12 +194,19 @@ Look ChooseLook(const Volume& volume, const Statistics& s, const Options& option
     Color(look.Color, 0., 0xd9d9d9);
     Color(look.Color, .5 * top, 0xef8a62);
     Color(look.Color, top, 0xb2182b);
-    look.Opacity->AddPoint(-top, .7);
-    look.Opacity->AddPoint(-.35 * top, .05);
-    look.Opacity->AddPoint(0., .01);
-    look.Opacity->AddPoint(.35 * top, .05);
-    look.Opacity->AddPoint(top, .7);
+    look.Opacity->AddPoint(-top, .6);
+    look.Opacity->AddPoint(-.5 * top, .06);
+    look.Opacity->AddPoint(-.2 * top, 0.);
+    look.Opacity->AddPoint(.2 * top, 0.);
+    look.Opacity->AddPoint(.5 * top, .06);
+    look.Opacity->AddPoint(top, .6);
     look.Shade = false;
+    look.TissueOpacity = .25;
+    // Along the positive reflectors.
+    look.Mapping = "transfer";
+    look.Passage = vtkSmartPointer<vtkPiecewiseFunction>::New();
+    look.Passage->AddPoint(.2 * top, 0.);
+    look.Passage->AddPoint(.45 * top, 1.);
   }
   else if (look.Preset == "seismic")
   {
@@ -210,9 +217,14 @@ Look ChooseLook(const Volume& volume, const Statistics& s, const Options& option
     {
       Color(look.Color, lo + (hi - lo) * i / 4., colors[i]);
     }
-    look.Opacity->AddPoint(lo, .02);
-    look.Opacity->AddPoint(hi, .12);
+    look.Opacity->AddPoint(lo, .004);
+    look.Opacity->AddPoint(hi, .02);
+    look.GradientOpacity = vtkSmartPointer<vtkPiecewiseFunction>::New();
+    look.GradientOpacity->AddPoint(0., .5);
+    look.GradientOpacity->AddPoint(.04 * range, 3.);
     look.Shade = false;
+    look.GradientScaleFactor = .55;
+    look.Absorption = "albedo";
   }
   else if (look.Preset == "ct")
   {
@@ -232,6 +244,9 @@ Look ChooseLook(const Volume& volume, const Statistics& s, const Options& option
     look.GradientOpacity = vtkSmartPointer<vtkPiecewiseFunction>::New();
     look.GradientOpacity->AddPoint(0., .15);
     look.GradientOpacity->AddPoint(.08 * range, 1.);
+    look.TissueOpacity = .6;
+    look.GradientScaleFactor = .55;
+    look.Absorption = "albedo";
   }
   else
   {
@@ -306,7 +321,7 @@ Look ChooseLook(const Volume& volume, const Statistics& s, const Options& option
   return look;
 }
 
-std::array<double, 3> WidestEvenRegion(const Volume& volume, const Statistics& s)
+std::array<double, 3> DefaultSeed(const Volume& volume, const Statistics& s, std::string& how)
 {
   // 1. Block means on a grid of at most 96 points along an axis.
   const auto& dims = volume.Dimensions;
@@ -358,11 +373,44 @@ std::array<double, 3> WidestEvenRegion(const Volume& volume, const Statistics& s
       }
     }
   }
-  // 2. Edges: a difference to a neighbour above a tenth of the range of what is not air. Air:
-  // below the threshold, unless the values have either sign.
+  // Signed: the strongest that is not at the border, the nearer the middle the better.
+  if (s.IsSigned())
+  {
+    how = "the strongest positive value near the middle";
+    std::array<double, 3> strongest = { { (dims[0] - 1) / 2., (dims[1] - 1) / 2.,
+      (dims[2] - 1) / 2. } };
+    double best = 0.;
+    for (int k = 0; k < size[2]; ++k)
+    {
+      for (int j = 0; j < size[1]; ++j)
+      {
+        for (int i = 0; i < size[0]; ++i)
+        {
+          const int position[3] = { i, j, k };
+          double near = 1.;
+          for (int a = 0; a < 3; ++a)
+          {
+            near -= std::pow((position[a] + .5) / size[a] * 2. - 1., 2) / 3.;
+          }
+          const double score = near * mean[at(i, j, k)];
+          if (score > best)
+          {
+            best = score;
+            for (int a = 0; a < 3; ++a)
+            {
+              strongest[a] = position[a] * step[a] + (step[a] - 1) / 2.;
+            }
+          }
+        }
+      }
+    }
+    return strongest;
+  }
+  how = "the middle of the widest even region";
+  // 2. Edges: a difference to a neighbour above a tenth of the range of what is not air, which
+  // is below the threshold.
   const double range = s.Quantile(.98, s.Threshold) - s.Threshold;
   const double edge = .12 * (range > 0. ? range : 1.);
-  const bool anyValue = s.Minimum < 0. && s.Maximum > 0. && -s.Minimum > .2 * s.Maximum;
   constexpr float far = 1e6F;
   std::vector<float> distance(n, far);
   for (int k = 0; k < size[2]; ++k)
@@ -372,7 +420,7 @@ std::array<double, 3> WidestEvenRegion(const Volume& volume, const Statistics& s
       for (int i = 0; i < size[0]; ++i)
       {
         const double v = mean[at(i, j, k)];
-        bool blocked = !std::isfinite(v) || (!anyValue && v < s.Threshold);
+        bool blocked = !std::isfinite(v) || v < s.Threshold;
         const int position[3] = { i, j, k };
         for (int a = 0; a < 3 && !blocked; ++a)
         {

@@ -26,6 +26,8 @@ struct Statistics
 
   /** The value below which this fraction of the voxels above `above` lies. */
   double Quantile(double fraction, double above) const;
+  /** Zero lies inside: amplitudes, not densities. */
+  bool IsSigned() const { return Minimum < 0. && -Minimum > .2 * Maximum && Maximum > 0.; }
 };
 
 /** Of the finite values that are not declared no data; an Error where there is none. */
@@ -43,6 +45,7 @@ struct Look
   double GradientScaleFactor = 1.;
   std::string Absorption = "complement";
   double Albedo = .99;
+  vtkSmartPointer<vtkPiecewiseFunction> Passage; // of the transfer mappings; null: the opacity
   double Reach = 0.;
   double LightOpacity = .9;
   double TissueOpacity = 1.;
@@ -50,8 +53,13 @@ struct Look
 
 Look ChooseLook(const Volume& volume, const Statistics& statistics, const Options& options);
 
-/** The voxel (of Image, from 0) in the middle of the widest even region that is not air. */
-std::array<double, 3> WidestEvenRegion(const Volume& volume, const Statistics& statistics);
+/**
+ * Where light starts that nobody placed, as a voxel of Image, from 0: the middle of the widest even
+ * region that is not air; of signed data, whose zero means nothing, the strongest positive value,
+ * rather near the middle. `how` says which.
+ */
+std::array<double, 3> DefaultSeed(
+  const Volume& volume, const Statistics& statistics, std::string& how);
 
 } // namespace lightvolume
 

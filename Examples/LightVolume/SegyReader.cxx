@@ -453,7 +453,7 @@ Volume ReadSegy(const std::string& path, int inlineByte, int crosslineByte, doub
       (step > 0. ? "not on a rectangular grid" : "missing") +
       ": lines are drawn one sample interval apart; z is minus time in ms");
   }
-  Place(volume, m);
+  Place(volume, m, true);
   return volume;
 }
 

@@ -90,7 +90,9 @@ std::array<double, 3> Volume::Voxel(const std::array<double, 3>& world) const
 std::string FormatNumber(double value)
 {
   char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
+  // Survey coordinates: metres, not millions of them.
+  const bool large = std::abs(value) >= 1e5 && std::abs(value) < 1e12;
+  std::snprintf(text, sizeof text, large ? "%.1f" : "%.6g", value);
   return text;
 }
 
@@ -99,7 +101,7 @@ std::string FormatPoint(const double p[3])
   return "(" + FormatNumber(p[0]) + ", " + FormatNumber(p[1]) + ", " + FormatNumber(p[2]) + ")";
 }
 
-void Place(Volume& volume, const Affine& fileToWorld)
+void Place(Volume& volume, const Affine& fileToWorld, bool upright)
 {
   int dims[3];
   volume.Image->GetDimensions(dims);
@@ -196,25 +198,43 @@ void Place(Volume& volume, const Affine& fileToWorld)
       direction[r][a] = rigid[4 * r + a] / spacing[a];
     }
   }
-  if (leftHanded)
+  // The world axis that each axis is closest to, and whether it runs against it.
+  bool against[3];
+  int vertical = 2;
+  for (int a = 0; a < 3; ++a)
   {
-    // Reverse an axis that runs against the world's; failing that, the slowest.
-    int axis = 2;
-    for (int a = 0; a < 3; ++a)
+    int dominant = 0;
+    for (int r = 1; r < 3; ++r)
     {
-      int dominant = 0;
-      for (int r = 1; r < 3; ++r)
+      if (std::abs(direction[r][a]) > std::abs(direction[dominant][a]))
       {
-        if (std::abs(direction[r][a]) > std::abs(direction[dominant][a]))
-        {
-          dominant = r;
-        }
+        dominant = r;
       }
-      if (direction[dominant][a] < 0.)
+    }
+    against[a] = direction[dominant][a] < 0.;
+    vertical = dominant == 2 ? a : vertical;
+  }
+  bool reverse[3] = { false, false, false };
+  reverse[vertical] = upright && against[vertical];
+  if (leftHanded != reverse[vertical])
+  {
+    // One more, to be right-handed: an axis that runs against the world's; failing that, the
+    // slowest that is left.
+    int axis = upright && vertical == 2 ? 1 : 2;
+    for (int a = 2; a >= 0; --a)
+    {
+      if (against[a] && !(upright && a == vertical))
       {
         axis = a;
-        break;
       }
+    }
+    reverse[axis] = true;
+  }
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    if (!reverse[axis])
+    {
+      continue;
     }
     ReverseAxis(volume.Image, axis);
     for (int r = 0; r < 3; ++r)

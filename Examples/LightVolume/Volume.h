@@ -71,8 +71,9 @@ struct Volume
  *    a note that gives the largest displacement; beyond, an Error (resample the file).
  * 3. A left-handed triple (VTK 9.1's volume mapper draws nothing then): one axis of the
  *    data is reversed, which leaves every voxel where it was.
+ * 4. With `upright` the axis along world z is made to run upwards, too.
  */
-void Place(Volume& volume, const Affine& fileToWorld);
+void Place(Volume& volume, const Affine& fileToWorld, bool upright = false);
 
 std::string FormatNumber(double value);
 std::string FormatPoint(const double p[3]);
