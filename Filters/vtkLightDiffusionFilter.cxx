@@ -133,6 +133,12 @@ void vtkLightDiffusionFilter::ResetState()
 }
 
 //------------------------------------------------------------------------------
+vtkImageData* vtkLightDiffusionFilter::GetIntermediateOutput()
+{
+  return this->IntermediateOutput;
+}
+
+//------------------------------------------------------------------------------
 int vtkLightDiffusionFilter::FillInputPortInformation(int, vtkInformation* info)
 {
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");

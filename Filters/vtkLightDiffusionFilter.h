@@ -299,7 +299,7 @@ public:
    */
   vtkSetMacro(IntermediateInterval, double);
   vtkGetMacro(IntermediateInterval, double);
-  vtkImageData* GetIntermediateOutput() { return this->IntermediateOutput; }
+  vtkImageData* GetIntermediateOutput();
   ///@}
 
   ///@{
