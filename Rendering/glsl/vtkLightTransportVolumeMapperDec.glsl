@@ -10,17 +10,16 @@
 
 #if LT_MODE == 2
 #define ltFieldValue vec3
-#define ltFetch(positionFC) texture(in_ltField, positionFC).xyz
+#define ltFetch(positionFC) textureLod(in_ltField, positionFC, 0.0).xyz
 #define ltMagnitude(field) length(field)
 #else
 #define ltFieldValue float
-#define ltFetch(positionFC) texture(in_ltField, positionFC).x
+#define ltFetch(positionFC) textureLod(in_ltField, positionFC, 0.0).x
 #define ltMagnitude(field) abs(field)
 #endif
 
 uniform sampler3D in_ltField; // phi or E over the field's maximum
-uniform sampler2D in_ltMap;   // over t: rgb colour, a how lit; row 0 phi > 0, row 1 phi < 0
-uniform float in_ltMapLast;   // its last column
+uniform sampler2D in_ltMap;   // over t: rgb colour, a how lit; row 0 phi > 0, row 1 phi < 0; nearest
 uniform mat4 in_ltDatasetToFC;
 uniform int in_ltLogarithmic;
 uniform vec2 in_ltWindow;      // t = slope * (log2) |field| + offset
@@ -66,16 +65,13 @@ vec4 ltLight(ltFieldValue field)
 {
   float magnitude = ltMagnitude(field);
   float t = ltPosition(magnitude);
-  // The nearest of many entries: half the cost of a filtered look-up on llvmpipe.
-  ivec2 entry = ivec2(int(t * in_ltMapLast + 0.5), 0);
 #if LT_MODE == 2
-  vec4 light = texelFetch(in_ltMap, entry, 0);
+  vec4 light = textureLod(in_ltMap, vec2(t, 0.25), 0.0);
   vec3 direction = abs(field) / max(magnitude, 1e-37);
   float strongest = max(max(direction.x, direction.y), max(direction.z, 1e-3));
   light.rgb = (0.3 + 0.7 * t) * direction / strongest;
 #else
-  entry.y = field < 0.0 ? 1 : 0;
-  vec4 light = texelFetch(in_ltMap, entry, 0);
+  vec4 light = textureLod(in_ltMap, vec2(t, field < 0.0 ? 0.75 : 0.25), 0.0);
 #endif
   light.a = t > 0.0 ? light.a : 0.0;
   return light;
