@@ -103,8 +103,9 @@ public:
 
   ///@{
   /**
-   * A field that takes more bytes than this as 32-bit floats is kept in 16-bit
-   * floats, which hold nine decades at 3 digits. Default: 256 MiB.
+   * Fields of at most this many bytes as 32-bit floats are kept so on the GPU,
+   * others in 16-bit floats, which hold nine decades below the maximum at 3 digits
+   * and draw faster. Default: 0, all in 16 bits. Holds from the next upload on.
    */
   vtkSetMacro(FloatFieldLimit, vtkTypeInt64);
   vtkGetMacro(FloatFieldLimit, vtkTypeInt64);
@@ -131,7 +132,7 @@ protected:
 
   void GPURender(vtkRenderer* renderer, vtkVolume* volume) override;
 
-  vtkTypeInt64 FloatFieldLimit = vtkTypeInt64(256) << 20;
+  vtkTypeInt64 FloatFieldLimit = 0;
   int NumberOfLightFieldUploads = 0;
   int NumberOfColorMapUploads = 0;
   int NumberOfShaderBuilds = 0;

@@ -299,6 +299,7 @@ void testPrecision(Suite& suite)
     return glow(p, { 5., 5., 5. }, .8) - glow(p, { 14., 10., 12. }, .8);
   };
   setFluence<vtkDoubleArray>(image, phi);
+  scene.mapper->SetFloatFieldLimit(1 << 20);
   scene.mapper->SetLightFieldData(image);
   const Picture reference = scene.capture();
   writePicture(suite, reference, "VolumeMapperPrecision");
