@@ -1404,6 +1404,7 @@ DiffusionReport DiffusionSolver::stepImplicit(
   report.reason = StopReason::MaxIterations;
   const std::int64_t solves = static_cast<std::int64_t>(stages) * steps;
   DiffusionControl sharper = control;
+  sharper.targetError = sharper.timeBudget = 0.; // of a steady answer, not of a step
   for (std::int64_t solve = 0; solve < solves; ++solve)
   {
     if (solve % stages == 0)
@@ -1526,6 +1527,7 @@ DiffusionReport DiffusionSolver::march(
   double* from = phi;
   double* to = other.data();
   const double step = local ? length : length * this->scale;
+  double seen = began;
   report.reason = StopReason::MaxIterations;
   for (int i = 0; i < steps; ++i)
   {
@@ -1563,6 +1565,11 @@ DiffusionReport DiffusionSolver::march(
     {
       report.reason = StopReason::Converged;
       break;
+    }
+    if (control.intermediate && now() - seen >= control.intermediateInterval)
+    {
+      control.intermediate(from);
+      seen = now();
     }
     if (control.progress && !control.progress(static_cast<double>(i + 1) / steps))
     {

@@ -559,6 +559,7 @@ FirstMomentReport FirstMomentSolver::step(
   this->weighAbsorption(length);
   report.bytes = this->bytes() + size * static_cast<std::int64_t>(sizeof(double));
   report.reason = StopReason::MaxIterations;
+  double seen = began;
   for (int i = 0; i < steps; ++i)
   {
     // E goes from where it is to half a step after phi, phi from there half a step further.
@@ -582,6 +583,11 @@ FirstMomentReport FirstMomentSolver::step(
     {
       report.reason = StopReason::Converged;
       break;
+    }
+    if (control.intermediate && now() - seen >= control.intermediateInterval)
+    {
+      control.intermediate(phi);
+      seen = now();
     }
     if (control.progress && !control.progress(static_cast<double>(i + 1) / steps))
     {

@@ -333,6 +333,23 @@ void local(Suite& suite)
     }
     LT_CHECK(suite, bounded);
   }
+  // what was reached is shown on the way; an error to aim at is a steady answer's, not a step's
+  DiffusionScene shown = randomScene(12, { { 8, 7, 6 } }, 1.);
+  DiffusionSolver stepper;
+  stepper.setMedium(shown.medium());
+  int seen = 0;
+  control.intermediate = [&seen](const double*) { ++seen; };
+  control.intermediateInterval = 0.;
+  stepper.stepLocal(shown.q.data(), shown.phi.data(), 5, 1., control);
+  LT_CHECK(suite, seen == 5);
+  control = DiffusionControl();
+  std::vector<double> strict = shown.phi;
+  const double cdt = 20. * stepper.positivityBound();
+  stepper.stepImplicit(shown.q.data(), strict.data(), 3, cdt, control);
+  control.targetError = 0.3;
+  control.timeBudget = 1e-9;
+  stepper.stepImplicit(shown.q.data(), shown.phi.data(), 3, cdt, control);
+  LT_CHECK(suite, strict == shown.phi);
   // a fraction that is none, and a medium that has no steady state
   DiffusionScene closed({ { 4, 4, 4 } }, { { 1., 1., 1. } });
   closed.boundary = Boundary::ZeroFlux;

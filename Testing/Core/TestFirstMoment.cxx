@@ -690,6 +690,12 @@ void conduct(Suite& suite)
   const double cdt = solver.courantBound();
   FirstMomentReport report = solver.step(scene.q.data(), scene.phi.data(), 9, cdt, control);
   LT_CHECK(suite, report.reason == StopReason::Cancelled && report.iterations == 4);
+  control = DiffusionControl();
+  int seen = 0;
+  control.intermediate = [&](const double* phi) { seen += phi == scene.phi.data() ? 1 : 0; };
+  control.intermediateInterval = 0.;
+  solver.step(scene.q.data(), scene.phi.data(), 5, cdt, control);
+  LT_CHECK(suite, seen == 5);
   for (const double wrong : { 0., -1., std::numeric_limits<double>::infinity(), std::nan("") })
   {
     report = solver.step(scene.q.data(), scene.phi.data(), 1, wrong, control);
