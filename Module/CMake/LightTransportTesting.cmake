@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # lighttransport_add_tests(LAYER Filters LIBRARIES ... TESTS TestA TestB ...
-#                          [LABELS long] [ENVIRONMENT A=B ...])
+#                          [LABELS long] [ENVIRONMENT A=B ...] [NO_LEAK_CHECK])
 #
 # One executable and one ctest per TestX.cxx, with a main() of its own, labelled
 # with the layer. Exit code 125 is a skip. The tests get
@@ -23,7 +23,7 @@ set(LIGHTTRANSPORT_TEST_ARGUMENTS
   -D "${CMAKE_SOURCE_DIR}/../shared/data")
 
 function (lighttransport_add_tests)
-  cmake_parse_arguments(arg "" "LAYER" "LIBRARIES;TESTS;LABELS;ENVIRONMENT" ${ARGN})
+  cmake_parse_arguments(arg "NO_LEAK_CHECK" "LAYER" "LIBRARIES;TESTS;LABELS;ENVIRONMENT" ${ARGN})
   foreach (test IN LISTS arg_TESTS)
     set(name "${arg_LAYER}-${test}")
     add_executable("${test}" "${test}.cxx")
@@ -31,7 +31,7 @@ function (lighttransport_add_tests)
     lighttransport_autoinit("${test}" ${arg_LIBRARIES})
     # Mesa passes; a GPU's driver may keep what it once allocated (then
     # LSAN_OPTIONS=suppressions=FILE, or without LIGHTTRANSPORT_LEAK_CHECK).
-    if (LIGHTTRANSPORT_LEAK_CHECK)
+    if (LIGHTTRANSPORT_LEAK_CHECK AND NOT arg_NO_LEAK_CHECK)
       target_link_options("${test}" PRIVATE -fsanitize=leak)
     endif ()
     add_test(NAME "${name}" COMMAND "${test}" ${LIGHTTRANSPORT_TEST_ARGUMENTS})
