@@ -682,7 +682,7 @@ int Run(Options options)
   const bool millimetres = volume.Unit == "mm";
   const std::string litText = millimetres ? Rounded(litVolume / 1000.) + " ml"
                                           : Rounded(litVolume) + " " + volume.Unit + "^3";
-  progress.Say("lit region: " + litText + " (" + FormatNumber(region.Voxels) + " voxels) above " +
+  progress.Say("lit region: " + litText + " (" + Fixed(region.Voxels, 0) + " voxels) above " +
     FormatNumber(options.Threshold) + " of the maximum");
 
   // Files.
@@ -746,7 +746,8 @@ int Run(Options options)
       });
   }
 
-  // Pictures.
+  // Pictures. Should OpenGL fail, the report is written all the same.
+  std::string noPicture;
   if (options.Render)
   {
     Pictures pictures(volume, statistics, look, options);
@@ -767,13 +768,38 @@ int Run(Options options)
           FormatNumber(seed.Power));
       }
     }
-    caption.push_back("mapping " + look.Mapping +
-      (sigma > 0. ? " " + Rounded(sigma) + (named ? "/" + volume.Unit : "") : "") + ", reach " +
-      Rounded(look.Reach) + (named ? " " + volume.Unit : "") + "; lit: " + litText);
-    pictures.SetCaption(caption);
-    for (const std::string& kind : options.Pictures)
+    for (const Stroke& stroke : options.Strokes)
     {
-      write(kind + ".png", [&](const std::string& path) { pictures.Write(kind, path); });
+      if (caption.size() < 5)
+      {
+        caption.push_back("a stroke through " + std::to_string(stroke.Points.size()) +
+          " points, power " + FormatNumber(stroke.Power));
+      }
+    }
+    if (paint.Image)
+    {
+      caption.push_back("painted: " + Name(options.Paint));
+    }
+    const std::string unit = named ? " " + volume.Unit : "";
+    const std::string edges =
+      sigma > 0. ? Rounded(sigma) + (named ? "/" + volume.Unit : "") : std::string();
+    caption.push_back(
+      (options.Model == "anisotropic"
+          ? "Perona-Malik, edges of " + edges + ", " + std::to_string(options.Steps) + " steps"
+          : "mapping " + look.Mapping + (edges.empty() ? "" : " " + edges) + ", reach " +
+            Rounded(look.Reach) + unit) +
+      "; lit: " + litText);
+    pictures.SetCaption(caption);
+    try
+    {
+      for (const std::string& kind : options.Pictures)
+      {
+        write(kind + ".png", [&](const std::string& path) { pictures.Write(kind, path); });
+      }
+    }
+    catch (const Error& error)
+    {
+      noPicture = error.what();
     }
   }
 
@@ -862,6 +888,10 @@ int Run(Options options)
     list += " " + name;
   }
   progress.Say("in " + folder + ":" + list);
+  if (!noPicture.empty())
+  {
+    throw Error(noPicture);
+  }
   return converged ? 0 : 2;
 }
 } // namespace

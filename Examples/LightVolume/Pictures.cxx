@@ -196,6 +196,7 @@ Pictures::Pictures(
   p.Property->SetDecades(options.Decades);
   p.Property->SetStrength(options.Strength);
   p.Property->SetLightOpacity(look.LightOpacity);
+  p.Property->SetLightOpacityUnitDistance(diagonal / 100.);
   p.Property->SetTissueOpacity(look.TissueOpacity);
 
   p.Scene->AddVolume(p.Prop);
@@ -409,8 +410,9 @@ void Pictures::Parts::ShowLegend(bool on)
   for (int negative = 0; negative < 2; ++negative)
   {
     vtkScalarBarActor* bar = negative ? this->NegativeBar : this->Bar;
-    // A trace of undershoot is no negative light.
-    const double extreme = negative ? (range[0] < -1e-6 * range[1] ? range[0] : 0.) : range[1];
+    // The solver's undershoot, below the last decade shown, is no negative light.
+    const double lowest = range[1] * std::pow(10., 1. - this->Property->GetDecades());
+    const double extreme = negative ? (-range[0] > lowest ? range[0] : 0.) : range[1];
     if (this->StyleBar(
           bar, negative ? this->NegativeColors : this->BarColors, negative ? -1. : 1., extreme))
     {
@@ -452,7 +454,10 @@ void Pictures::Write(const std::string& kind, const std::string& path)
   {
     p.Mapper->SetLightFieldData(lit ? p.Light.Get() : nullptr);
     p.ShowLegend(lit);
-    p.Caption->SetInput(p.CaptionText.c_str());
+    const char* axes = p.TheVolume->IsRAS
+      ? "colour: where light flows to or from; red right-left, green front-back, blue up-down"
+      : "colour: where light flows to or from; red along x, green y, blue z";
+    p.Caption->SetInput((kind == "flux" ? axes + ("\n" + p.CaptionText) : p.CaptionText).c_str());
     p.Caption->SetVisibility(lit);
   }
   p.Window->Render();

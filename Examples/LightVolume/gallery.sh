@@ -60,7 +60,7 @@ keep dam/lit.png 7-dam.png
 keep dam/slices.png 7-dam-slices.png
 
 run painted --stroke @90,150,88:@90,146,97:@90,136,104:@90,120,107:@90,104,104:@90,94,95:r=2 \
-  --gradient-scale 5 --albedo 0.997 --reach 6 --pictures lit --files none \
+  --gradient-scale 5 --albedo 0.997 --reach 3 --pictures lit --files none \
   --title "A painted source: a stroke along the corpus callosum"
 keep painted/lit.png 8-painted.png
 

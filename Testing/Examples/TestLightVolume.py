@@ -212,6 +212,22 @@ class LightVolume(unittest.TestCase):
         self.assertEqual(code, 0, stdout + stderr)
         self.assertIn("no --seed", stdout)
 
+    def test_what_opengl_cannot_draw_leaves_the_rest(self):
+        if not ARGUMENTS.picture:
+            self.skipTest("no OpenGL")
+        # Longer than any GPU's 3-D texture.
+        long = self.path("long.nii")
+        dims = (20000, 2, 2)
+        with open(long, "wb") as file:
+            file.write(nifti(bytes(n % 7 for n in range(80000)), dims=dims))
+        out = self.path("long")
+        code, stdout, stderr = self.run_program(
+            long, "--seed", "@100,1,1", "--out", out, "--size", "64x64", "--files", "nii")
+        self.assertEqual(code, 1, stdout + stderr)
+        self.assertEqual(len(stderr.strip().split("\n")), 1, stderr)
+        self.assertIn("cannot make the picture 'plain'", stderr)
+        self.assertEqual(sorted(os.listdir(out)), ["lit.nii.gz", "report.json"])
+
     def test_options_are_refused_by_name(self):
         ball = self.ball
         self.refuse(ball, "--sede", "1,2,3", words=("--sede", "did you mean --seed?"))
