@@ -239,8 +239,8 @@ double FirstMomentSolver::stabilityBound()
   }
   const double courant = this->courantBound();
   // Gershgorin's bound of the eigenvalues of M^-1 grad^T m^-1 grad, over 4: it grows with c dt.
-  const auto load =
-    [](double t, const double(&G)[6], const double(&h)[3], const bool(&border)[6], double sigma)
+  const auto load = [](double t, const double(&G)[6], const double(&h)[3], const bool(&border)[6],
+                      double sigma, double (*tanh)(double))
   {
     double sum = 0.;
     for (int f = 0; f < 6; ++f)
@@ -248,13 +248,15 @@ double FirstMomentSolver::stabilityBound()
       if (G[f] > 0.)
       {
         const double step = h[f / 2];
-        sum +=
-          (border[f] ? 2. : 4.) * G[f] / step * std::tanh(0.5 * rate(G[f], step, border[f]) * t);
+        sum += (border[f] ? 2. : 4.) * G[f] / step * tanh(0.5 * rate(G[f], step, border[f]) * t);
       }
     }
     const double x = 0.5 * sigma * t;
-    return 0.25 * sum * (x > 1e-8 ? std::tanh(x) / x * t : t);
+    return 0.25 * sum * (x > 1e-8 ? tanh(x) / x * t : t);
   };
+  const auto exact = [](double x) { return std::tanh(x); };
+  // at most 5 % above it, and far cheaper: most voxels pass
+  const auto above = [](double x) { return std::min(1., x / std::sqrt(1. + 2. / 3. * x * x)); };
   const std::array<int, 3>& n = this->box.dims;
   const double h[3] = { this->box.spacing[0], this->box.spacing[1], this->box.spacing[2] };
   // Beyond this no step is worth its name; the search starts from it in each row.
@@ -287,7 +289,8 @@ double FirstMomentSolver::stabilityBound()
             G[2 * d + 1] = static_cast<double>(f.conductance[i]);
           }
           const double sigma = static_cast<double>(this->sigma_a[rows[0].begin + x]);
-          if (load(bound, G, h, border, sigma) <= 1.)
+          if (load(bound, G, h, border, sigma, above) <= 1. ||
+            load(bound, G, h, border, sigma, exact) <= 1.)
           {
             continue; // does not lower the bound
           }
@@ -296,7 +299,7 @@ double FirstMomentSolver::stabilityBound()
           while (high - low > 1e-6 * low)
           {
             const double middle = std::sqrt(low * high);
-            (load(middle, G, h, border, sigma) <= 1. ? low : high) = middle;
+            (load(middle, G, h, border, sigma, exact) <= 1. ? low : high) = middle;
           }
           bound = low;
         }
