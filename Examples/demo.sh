@@ -22,9 +22,30 @@ lighttransport_build release >"$lighttransport_log/release.log" 2>&1 || {
   exit 1
 }
 
-say "light"
-bash Examples/LightVolume/gallery.sh build/release/bin/light-volume \
-  /usr/share/mricron/templates/ch2.nii.gz gallery
+# Lit again only if the program, the script or the head changed, or a picture is gone.
+program=build/release/bin/light-volume
+script=Examples/LightVolume/gallery.sh
+head=/usr/share/mricron/templates/ch2.nii.gz
+made=gallery/.made
+up_to_date()
+{
+  local file
+  [ -f "$made" ] || return 1
+  [ -z "$(find "$program" build/release/lib "$script" "$head" -newer "$made" -type f -print -quit)" ] ||
+    return 1
+  while read -r file; do
+    [ -s "$file" ] || return 1
+  done <"$made"
+}
+
+if up_to_date; then
+  say "nothing changed since the pictures were made"
+else
+  say "light"
+  rm -f "$made"
+  bash "$script" "$program" "$head" gallery
+  find gallery -type f -size +0 ! -name .made | sort >"$made"
+fi
 
 say "done; in gallery/:"
-find gallery -type f | sort
+grep -v '^gallery/runs/' "$made"
