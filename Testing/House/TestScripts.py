@@ -30,7 +30,7 @@ class TestScripts(unittest.TestCase):
         os.makedirs(self.bin)
         self.called = os.path.join(folder.name, "called")
         # A bare folder of programs: only what the scripts are known to use.
-        for name in "bash sh env sed grep tail cat mkdir dirname find sort".split():
+        for name in "bash sh env sed grep tail cat mkdir dirname find sort rm".split():
             os.symlink(shutil.which(name), os.path.join(self.bin, name))
         self.program("dpkg-query", "echo installed")
         self.program("apt-get", f'echo apt-get "$@" >>"{self.called}"')
@@ -140,6 +140,17 @@ class TestScripts(unittest.TestCase):
         self.assertIn("build/release/bin/light-volume\n", arguments)
         self.assertIn("/ch2.nii.gz\n", arguments)
         self.assertNotIn("apt-get", self.calls())
+
+        # Again: lit only if something changed or a picture is gone.
+        code, text = self.run_script("Examples/demo.sh")
+        self.assertEqual(code, 0, text)
+        self.assertIn("nothing changed", text)
+        self.assertTrue(text.rstrip().endswith("gallery/arguments"), text)
+        os.remove(os.path.join(self.top, "gallery", "arguments"))
+        code, text = self.run_script("Examples/demo.sh")
+        self.assertEqual(code, 0, text)
+        self.assertNotIn("nothing changed", text)
+        self.assertTrue(os.path.exists(os.path.join(self.top, "gallery", "arguments")))
 
 
 if __name__ == "__main__":
