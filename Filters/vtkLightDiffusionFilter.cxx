@@ -4,6 +4,7 @@
 
 #include "Core/Diffusion.h"
 #include "Core/FirstMoment.h"
+#include "Core/Seeds.h"
 #include "vtkLightTransportArrays.h"
 #include "vtkLightTransportCompat.h"
 #include "vtkLightTransportInternal.h"
@@ -32,6 +33,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <list>
 #include <new>
 #include <sstream>
 #include <vector>
@@ -97,6 +99,18 @@ const T* valuesOf(vtkDataArray* array, std::vector<T>& converted)
 //------------------------------------------------------------------------------
 struct vtkLightDiffusionFilter::State
 {
+  /** The fluence of one sphere of power 1. */
+  struct Solution
+  {
+    lighttransport::SphereSource sphere; // of power 1
+    lighttransport::Buffer<double> phi;
+  };
+  std::list<Solution> solutions; // the last used first; of the operator that is kept
+
+  /** phi = the sum of the spheres' fields, those that are not kept solved for first. */
+  lighttransport::DiffusionReport superpose(
+    vtkDataArray* spheres, double* phi, const lighttransport::DiffusionControl& control, int most);
+
   State()
     : solver(vtkLightTransportParallelFor())
   {
@@ -111,6 +125,81 @@ struct vtkLightDiffusionFilter::State
   vtkNew<vtkOpticalMediumFilter> conductance;
   MediumKey scalarsKey;
 };
+
+//------------------------------------------------------------------------------
+lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(
+  vtkDataArray* spheres, double* phi, const lighttransport::DiffusionControl& control, int most)
+{
+  using namespace lighttransport;
+  DiffusionReport all;
+  all.reason = StopReason::Converged;
+  const Grid grid = this->solver.grid();
+  const std::int64_t size = grid.size();
+  const ParallelFor parallel = vtkLightTransportParallelFor();
+  std::fill(phi, phi + size, 0.);
+  int used = 0;
+  for (vtkIdType s = 0; s < spheres->GetNumberOfTuples() && used < most; ++s)
+  {
+    SphereSource sphere;
+    for (int d = 0; d < 3; ++d)
+    {
+      sphere.center[d] = spheres->GetComponent(s, d);
+    }
+    sphere.radius = spheres->GetComponent(s, 3);
+    sphere.power = 1.;
+    const double power = spheres->GetComponent(s, 4);
+    auto found = std::find_if(this->solutions.begin(), this->solutions.end(),
+      [&](const Solution& one)
+      { return one.sphere.center == sphere.center && one.sphere.radius == sphere.radius; });
+    if (found == this->solutions.end())
+    {
+      if (power == 0.)
+      {
+        continue;
+      }
+      Solution one;
+      one.sphere = sphere;
+      one.phi.allocate(size);
+      std::vector<float> q(static_cast<std::size_t>(size));
+      const SourceReport sources = ComputeSources(grid, { sphere }, {}, q.data(), parallel, {});
+      if (sources.badSphere >= 0 || sources.badVoxel >= 0)
+      {
+        continue; // the sum of all is solved for as it is
+      }
+      DiffusionControl own = control;
+      own.tolerance = 0.3 * control.tolerance;
+      const DiffusionReport report = this->solver.solveSteady(q.data(), one.phi.data(), own);
+      all.iterations += report.iterations;
+      all.seconds += report.seconds;
+      all.fineApplications += report.fineApplications;
+      if (report.reason != StopReason::Converged)
+      {
+        all.reason = report.reason;
+        break; // cancelled, or no better: the solve of the sum tells
+      }
+      this->solutions.push_front(std::move(one));
+    }
+    else
+    {
+      this->solutions.splice(this->solutions.begin(), this->solutions, found);
+    }
+    ++used;
+    const double* field = this->solutions.front().phi.data();
+    parallel(size,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t i = begin; i < end; ++i)
+        {
+          phi[i] += power * field[i];
+        }
+      });
+  }
+  while (static_cast<int>(this->solutions.size()) > most)
+  {
+    this->solutions.pop_back();
+  }
+  return all;
+}
 
 //------------------------------------------------------------------------------
 vtkLightDiffusionFilter::vtkLightDiffusionFilter()
@@ -260,6 +349,11 @@ bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
   {
     text << "GradientScale is " << this->GradientScale
          << "; expected a number >= 0 (0: chosen from the data)";
+  }
+  else if (this->MaximumNumberOfKeptSolutions < 1)
+  {
+    text << "MaximumNumberOfKeptSolutions is " << this->MaximumNumberOfKeptSolutions
+         << "; expected at least 1";
   }
   else if (!std::isfinite(this->ActiveThreshold) || this->ActiveThreshold <= 0. ||
     this->ActiveThreshold >= 1.)
@@ -562,6 +656,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   if (!active && (!kept.valid || !(key == kept.key)))
   {
     kept.valid = false;
+    kept.solutions.clear();
     kept.phi.release();
     kept.moment.reset(
       moment ? new lighttransport::FirstMomentSolver(vtkLightTransportParallelFor()) : nullptr);
@@ -669,7 +764,23 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
         return kept.solver.stepImplicit(
           q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
       default:
-        return kept.solver.solveSteady(q, phi.data(), control);
+      {
+        vtkDataArray* spheres = input->GetFieldData()->GetArray(names::LightSeeds);
+        if (!this->KeepSolutions || !outside.empty() || !spheres ||
+          spheres->GetNumberOfComponents() != 5 || spheres->GetNumberOfTuples() == 0)
+        {
+          return kept.solver.solveSteady(q, phi.data(), control);
+        }
+        const DiffusionReport parts =
+          kept.superpose(spheres, phi.data(), control, this->MaximumNumberOfKeptSolutions);
+        // The rest (paint, strokes) and the check of the residual.
+        DiffusionReport sum = kept.solver.solveSteady(q, phi.data(), control);
+        sum.iterations += parts.iterations;
+        sum.seconds += parts.seconds;
+        sum.fineApplications += parts.fineApplications;
+        sum.bytes += static_cast<std::int64_t>(kept.solutions.size()) * size * 8;
+        return sum;
+      }
     }
   };
   DiffusionReport report;
@@ -903,6 +1014,8 @@ void vtkLightDiffusionFilter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "AbsorbedPower: " << this->AbsorbedPower << "\n";
   os << indent << "EscapedPower: " << this->EscapedPower << "\n";
   os << indent << "LeakedPower: " << this->LeakedPower << "\n";
+  os << indent << "KeepSolutions: " << this->KeepSolutions << "\n";
+  os << indent << "MaximumNumberOfKeptSolutions: " << this->MaximumNumberOfKeptSolutions << "\n";
   os << indent << "ActiveRegion: " << this->ActiveRegion << "\n";
   os << indent << "ActiveThreshold: " << this->ActiveThreshold << "\n";
   os << indent << "ActiveFraction: " << this->ActiveFraction << "\n";

@@ -248,6 +248,20 @@ public:
   vtkGetMacro(Continue, bool);
   vtkBooleanMacro(Continue, bool);
   ///@}
+  ///@{
+  /**
+   * Steady only: keep one solution per sphere of vtkLightSeedFilter (8 bytes per point each, at
+   * most MaximumNumberOfKeptSolutions), for a power of 1. Light is linear in its sources: what
+   * switches, dims or turns the sign of a light is then a sum and a check of its residual, not a
+   * solve; a new or moved one costs its own solve only. Default off. Not with an active region.
+   */
+  vtkSetMacro(KeepSolutions, bool);
+  vtkGetMacro(KeepSolutions, bool);
+  vtkBooleanMacro(KeepSolutions, bool);
+  vtkSetMacro(MaximumNumberOfKeptSolutions, int);
+  vtkGetMacro(MaximumNumberOfKeptSolutions, int);
+  ///@}
+
   /** Forget the last state, so that the next execution starts from phi = 0. */
   void ResetState();
 
@@ -405,6 +419,8 @@ private:
   double ComputedGradientScale = 0.;
   bool ComputeFlux = false;
   bool Continue = false;
+  bool KeepSolutions = false;
+  int MaximumNumberOfKeptSolutions = 16;
   bool ActiveRegion = false;
   double ActiveThreshold = 1e-7;
   double TargetError = 0.;

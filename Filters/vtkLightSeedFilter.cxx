@@ -10,6 +10,8 @@
 #include "vtkCellArray.h"
 #include "vtkCellArrayIterator.h"
 #include "vtkCellData.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
 #include "vtkFloatArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -624,6 +626,17 @@ std::string vtkLightSeedFilter::Compute(vtkImageData* input, vtkImageData* paint
   this->TotalPower = report.power;
   output->ShallowCopy(input);
   output->GetPointData()->AddArray(q);
+  vtkNew<vtkDoubleArray> seeds;
+  seeds->SetName(vtkLightTransportArrays::LightSeeds);
+  seeds->SetNumberOfComponents(5);
+  for (int i = 0; i < this->GetNumberOfSpheres(); ++i)
+  {
+    const SphereSource& sphere = spheres[i];
+    const double tuple[5] = { sphere.center[0], sphere.center[1], sphere.center[2], sphere.radius,
+      sphere.power };
+    seeds->InsertNextTuple(tuple);
+  }
+  output->GetFieldData()->AddArray(seeds);
   return {};
 }
 

@@ -19,6 +19,11 @@ constexpr const char* Source = "Source";
 constexpr const char* Fluence = "Fluence";
 /** E = -D grad(phi), three world components, in power/length^2. */
 constexpr const char* Flux = "Flux";
+/**
+ * Field data of vtkLightSeedFilter's output, a tuple per sphere: the centre as continuous voxel
+ * indices from the extent's first point, the radius (length) and the power.
+ */
+constexpr const char* LightSeeds = "LightSeeds";
 } // namespace vtkLightTransportArrays
 
 #endif

@@ -516,6 +516,69 @@ void frugal(Suite& suite)
   LT_CHECK(suite, show->count >= 2);
 }
 
+/** Switching, dimming and turning the sign of a light is a sum, not a solve. */
+void superposition(Suite& suite)
+{
+  auto volume = makeImage(32, 28, 24, VTK_FLOAT,
+    [](int i, int j, int k)
+    { return std::hypot(std::hypot(i - 16., j - 14.), k - 12.) < 9. ? 100. : 0.; });
+  vtkNew<vtkOpticalMediumFilter> medium;
+  medium->SetInputData(volume);
+  medium->SetReach(20.);
+  vtkNew<vtkLightSeedFilter> seeds;
+  seeds->SetInputConnection(medium->GetOutputPort());
+  seeds->AddSphere(10., 14., 12., 1.5, 1.);
+  seeds->AddSphere(20., 14., 12., 0., 2.);
+  seeds->AddSphere(16., 20., 12., 3., -0.5);
+  vtkNew<Filter> kept;
+  kept->SetInputConnection(seeds->GetOutputPort());
+  kept->KeepSolutionsOn();
+  kept->SetOutputPrecision(vtkAlgorithm::DOUBLE_PRECISION);
+  kept->Update();
+  LT_CHECK(suite, kept->GetNumberOfIterationsUsed() > 0);
+  const auto compare = [&](const char* what, int iterations)
+  {
+    kept->Update();
+    vtkNew<Filter> fresh;
+    fresh->SetInputConnection(seeds->GetOutputPort());
+    fresh->SetOutputPrecision(vtkAlgorithm::DOUBLE_PRECISION);
+    fresh->SetTolerance(1e-11);
+    fresh->Update();
+    double worst = 0.;
+    double most = 0.;
+    vtkDataArray* a = pointArray(kept, "Fluence");
+    vtkDataArray* b = pointArray(fresh, "Fluence");
+    for (vtkIdType i = 0; i < a->GetNumberOfTuples(); ++i)
+    {
+      worst = std::max(worst, std::abs(a->GetComponent(i, 0) - b->GetComponent(i, 0)));
+      most = std::max(most, std::abs(b->GetComponent(i, 0)));
+    }
+    std::cout << what << ": " << kept->GetNumberOfIterationsUsed() << " iterations, error "
+              << worst / most << "\n";
+    LT_CHECK(suite, kept->GetStopReason() == Filter::Converged);
+    LT_CHECK(suite, kept->GetNumberOfIterationsUsed() <= iterations);
+    LT_CHECK_NEAR(suite, worst / most, 0., 1e-6);
+  };
+  compare("all", 100);
+  seeds->SetSphere(1, 20., 14., 12., 0., -2.);
+  compare("sign turned", 0);
+  seeds->SetSphere(0, 10., 14., 12., 1.5, 0.3);
+  compare("dimmed", 0);
+  seeds->SetSphere(2, 16., 20., 12., 3., 0.);
+  compare("off", 0);
+  seeds->SetSphere(2, 16., 20., 12., 3., 1.);
+  compare("on", 0);
+  const vtkIdType bytes = kept->GetBytes();
+  seeds->SetSphere(0, 11., 14., 12., 1.5, 1.);
+  compare("moved", 30);
+  LT_CHECK(suite, kept->GetBytes() > bytes); // four are kept now: the old place too
+  kept->SetMaximumNumberOfKeptSolutions(2);
+  seeds->SetSphere(1, 20., 14., 12., 0., 1.);
+  compare("two kept", 60);
+  medium->SetReach(10.); // another medium: nothing holds any more
+  compare("another medium", 100);
+}
+
 void badInput(Suite& suite)
 {
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -645,6 +708,7 @@ int main(int argc, char* argv[])
   anisotropicDiffusion(suite);
   progress(suite);
   frugal(suite);
+  superposition(suite);
   badInput(suite);
   return suite.result();
 }
