@@ -93,14 +93,11 @@ double median(std::vector<double> values)
   return values.size() % 2 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
-/** The filters' own parallel-for, on so many threads. */
+/** The filters' own parallel-for; from now on vtkSMPTools has so many threads. */
 ParallelFor OnThreads(int threads)
 {
-  return [threads](std::int64_t n, const RangeBody& body)
-  {
-    vtkSMPTools::LocalScope(
-      vtkSMPTools::Config(threads), [&]() { vtkLightTransportParallelFor()(n, body); });
-  };
+  vtkSMPTools::Initialize(threads);
+  return vtkLightTransportParallelFor();
 }
 
 std::string load()

@@ -31,6 +31,7 @@ pyplot.rcParams.update(
         "axes.spines.top": False,
         "axes.spines.right": False,
         "axes.grid": True,
+        "axes.axisbelow": True,
         "grid.color": "#dddddd",
         "legend.frameon": False,
         "figure.constrained_layout.use": True,
@@ -111,7 +112,9 @@ def scaling():
     if not rows:
         return
     threads = max(int(row["threads"]) for row in rows)
-    figure, axes = pyplot.subplots(1, 3, figsize=(11, 3.6))
+    figure, axes = pyplot.subplots(
+        1, 4, figsize=(13, 3.4), gridspec_kw={"width_ratios": (4, 4, 4, 2.6)}
+    )
     panels = [
         ("ns per voxel", lambda r: 1e9 * float(r["seconds"]) / int(r["size"]) ** 3),
         ("iterations", lambda r: float(r["iterations"])),
@@ -143,8 +146,11 @@ def scaling():
     axes[2].annotate(
         "13 (HPGMG)", (0.02, 13), xycoords=("axes fraction", "data"), va="bottom", fontsize=7
     )
-    axes[0].legend(fontsize=6.5)
-    figure.suptitle(f"{threads} threads", fontsize=9)
+    lines, labels = axes[0].get_legend_handles_labels()
+    axes[3].axis("off")
+    axes[3].legend(
+        lines, labels, fontsize=7, handlelength=3.5, loc="center left", title=f"{threads} threads", title_fontsize=7
+    )
     save(figure, "scaling")
 
 
