@@ -448,6 +448,7 @@ void Pictures::Write(const std::string& kind, const std::string& path)
       p.SlicePosition[2] + p.Recentre[2]);
     p.Slices->SetLengthUnits(p.TheVolume->Unit == "unit" ? "" : p.TheVolume->Unit);
     p.Slices->SetShowArrows(kind == "arrows");
+    p.Slices->SetNumberOfArrowsAlong(44); // structures are small in the whole
     p.Slices->AddToRenderWindow(p.Window);
   }
   else

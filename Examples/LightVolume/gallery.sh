@@ -64,6 +64,6 @@ run painted --stroke @90,150,88:@90,146,97:@90,136,104:@90,120,107:@90,104,104:@
   --title "A painted source: a stroke along the corpus callosum"
 keep painted/lit.png 8-painted.png
 
-run anisotropic --seed $seed --model anisotropic --gradient-scale 5 --steps 8 --courant 40 \
-  --decades 4 --pictures lit --files none --title "Anisotropic diffusion (Perona-Malik), 8 steps"
+run anisotropic --seed $seed --model anisotropic --gradient-scale 5 --steps 4 --courant 80 \
+  --tolerance 1e-5 --decades 4 --pictures lit --files none --title "Anisotropic diffusion (Perona-Malik), 4 steps"
 keep anisotropic/lit.png 11-anisotropic.png
