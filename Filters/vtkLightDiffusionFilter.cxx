@@ -118,6 +118,9 @@ struct vtkLightDiffusionFilter::State
 
   lighttransport::DiffusionSolver solver;
   std::unique_ptr<lighttransport::FirstMomentSolver> moment; // where the model is FirstMoment
+  // What the solver looks at again while the key holds, where the arrays themselves do not serve.
+  std::vector<std::uint8_t> outside;
+  std::vector<double> storedD, storedSigma;
   MediumKey key;
   bool valid = false;                 // the solver's operator is that of the key
   lighttransport::Buffer<double> phi; // the last state, where Continue asks for it
@@ -636,7 +639,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       medium.grid.spacing = { { spacing[0], spacing[1], spacing[2] } };
       medium.D = d;
       medium.sigma_a = s;
-      medium.outside = outside.empty() ? nullptr : outside.data();
+      kept.outside = outside;
+      medium.outside = outside.empty() ? nullptr : kept.outside.data();
       medium.boundary = static_cast<lighttransport::Boundary>(this->Boundary);
       medium.refractiveIndexRatio = this->RefractiveIndexRatio;
       return action(medium);
@@ -647,10 +651,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       return act(0.f, valuesOf<float, vtkFloatArray>(D, unused),
         sigma_a ? valuesOf<float, vtkFloatArray>(sigma_a, unused) : nullptr);
     }
-    std::vector<double> storeD;
-    std::vector<double> storeSigma;
-    return act(0., valuesOf<double, vtkDoubleArray>(D, storeD),
-      sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, storeSigma) : nullptr);
+    return act(0., valuesOf<double, vtkDoubleArray>(D, kept.storedD),
+      sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, kept.storedSigma) : nullptr);
   };
   double setupSeconds = 0.;
   if (!active && (!kept.valid || !(key == kept.key)))

@@ -11,6 +11,7 @@
 #include <limits>
 #include <mutex>
 #include <sstream>
+#include <tuple>
 
 namespace lighttransport
 {
@@ -161,6 +162,20 @@ void combine(std::int64_t n, float beta, const float* LIGHTTRANSPORT_RESTRICT z,
   for (std::int64_t i = 0; i < n; ++i)
   {
     p[i] = z[i] + beta * p[i];
+  }
+}
+
+/** y += factor H(a, b) (x - other), H the harmonic mean: faces in double. */
+LIGHTTRANSPORT_SIMD
+void addFaces(int n, double factor, const double* LIGHTTRANSPORT_RESTRICT a,
+  const double* LIGHTTRANSPORT_RESTRICT b, const double* x, const double* other,
+  double* LIGHTTRANSPORT_RESTRICT y)
+{
+  constexpr double least = std::numeric_limits<double>::min();
+  for (int i = 0; i < n; ++i)
+  {
+    const double sum = a[i] + b[i];
+    y[i] += factor * (2. * a[i] * (b[i] / (sum > least ? sum : least))) * (x[i] - other[i]);
   }
 }
 
@@ -398,8 +413,11 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
     this->A.restrictTo(std::move(spans));
   }
   this->boundaryOf(medium.boundary);
-  const double twoA =
+  this->twoA =
     medium.boundary == Boundary::Robin ? 2. * BoundaryFactor(medium.refractiveIndexRatio) : 0.;
+  this->floatMedium = DiffusionMedium<float>();
+  this->doubleMedium = DiffusionMedium<double>();
+  std::get<DiffusionMedium<T>&>(std::tie(this->floatMedium, this->doubleMedium)) = medium;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   const double inverse = 1. / this->scale;
   ForRows(this->parallelFor, this->A.numberOfRows(), this->A.activeSize,
@@ -442,7 +460,7 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
                 if (at[d] == (side ? n[d] - 1 : 0))
                 {
                   const double Dd = static_cast<double>(Di);
-                  const double out = Dd / (0.5 * h[d] + twoA * Dd) / h[d] * inverse;
+                  const double out = Dd / (0.5 * h[d] + this->twoA * Dd) / h[d] * inverse;
                   this->border[d][side][static_cast<std::size_t>(this->borderIndex(d, at))] =
                     static_cast<float>(out);
                   sink += out;
@@ -598,6 +616,82 @@ double DiffusionSolver::norm(const RightHandSide<T>& b) const
     }));
 }
 
+/**
+ * A phi of one row in double from the medium itself: the stored faces are float, which is
+ * enough to move phi and not to judge it. Beyond an active region phi is 0.
+ */
+template <class T>
+void DiffusionSolver::applyExactly(const DiffusionMedium<T>& medium, const double* phi,
+  std::int64_t row, std::int64_t o, int n, double* y) const
+{
+  const std::array<int, 3>& dims = this->box.dims;
+  const std::array<double, 3>& h = this->box.spacing;
+  const std::int64_t stride[3] = { 1, dims[0], static_cast<std::int64_t>(dims[0]) * dims[1] };
+  const int at[3] = { static_cast<int>(o - row * dims[0]), static_cast<int>(row % dims[1]),
+    static_cast<int>(row / dims[1]) };
+  const double inverse = 1. / this->scale;
+  static thread_local std::vector<double> store;
+  store.resize(2 * static_cast<std::size_t>(n + 2));
+  double* own = store.data() + 1;
+  double* other = own + n + 2;
+  const auto load = [&](std::int64_t from, int first, int last, double* to)
+  {
+    for (int i = first; i < last; ++i)
+    {
+      const std::int64_t v = from + i;
+      to[i] = medium.outside && medium.outside[v] ? 0. : static_cast<double>(medium.D[v]);
+    }
+  };
+  // the row's own D, and one more on either side where there is one
+  const int before = at[0] > 0 ? 1 : 0;
+  const int after = at[0] + n < dims[0] ? 1 : 0;
+  load(o, -before, n + after, own);
+  for (int i = 0; i < n; ++i)
+  {
+    const std::int64_t v = o + i;
+    const bool absorbs = medium.sigma_a && !(medium.outside && medium.outside[v]);
+    y[i] = absorbs ? static_cast<double>(medium.sigma_a[v]) * inverse * phi[v] : 0.;
+  }
+  const double* x = phi + o;
+  for (int d = 0; d < 3; ++d)
+  {
+    if (dims[d] == 1)
+    {
+      continue;
+    }
+    const double factor = inverse / (h[d] * h[d]);
+    for (int side = -1; side <= 1; side += 2)
+    {
+      if (d == 0)
+      {
+        const int first = side < 0 ? 1 - before : 0;
+        const int last = side < 0 ? n : n - 1 + after;
+        addFaces(last - first, factor, own + first, own + first + side, x + first, x + first + side,
+          y + first);
+      }
+      else if (at[d] + side >= 0 && at[d] + side < dims[d])
+      {
+        load(o + side * stride[d], 0, n, other);
+        addFaces(n, factor, own, other, x, x + side * stride[d], y);
+      }
+      if (medium.boundary == Boundary::ZeroFlux)
+      {
+        continue;
+      }
+      const int edge = side < 0 ? 0 : dims[d] - 1;
+      const int first = d == 0 ? edge - at[0] : 0;
+      const int last = d == 0 ? first + 1 : n;
+      if (d == 0 ? first >= 0 && first < n : at[d] == edge)
+      {
+        for (int i = first; i < last; ++i)
+        {
+          y[i] += own[i] / (0.5 * h[d] + this->twoA * own[i]) / h[d] * inverse * x[i];
+        }
+      }
+    }
+  }
+}
+
 template <class T>
 double DiffusionSolver::residual(
   const RightHandSide<T>& b, const double* phi, float* out, double rScale) const
@@ -608,7 +702,18 @@ double DiffusionSolver::residual(
     {
       static thread_local std::vector<double> y;
       y.resize(static_cast<std::size_t>(n));
-      applyDouble(doubleRow(this->A, phi, row, o, n), y.data());
+      if (!b.ofSteps && this->floatMedium.D)
+      {
+        this->applyExactly(this->floatMedium, phi, row, o, n, y.data());
+      }
+      else if (!b.ofSteps && this->doubleMedium.D)
+      {
+        this->applyExactly(this->doubleMedium, phi, row, o, n, y.data());
+      }
+      else
+      {
+        applyDouble(doubleRow(this->A, phi, row, o, n), y.data()); // what the steps step with
+      }
       double sum = 0.;
       for (int i = 0; i < n; ++i)
       {
@@ -1002,37 +1107,49 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
   };
   // an active region holds all sources
   report.emitted = !q ? 0. : V * sum([&](std::int64_t i) { return static_cast<double>(q[i]); });
-  const Buffer<float>& sinks = this->sinkWithoutShift.empty() ? this->A.s : this->sinkWithoutShift;
-  const double lost = V * this->scale *
-    sum([&](std::int64_t i)
-      { return sinks[i] > NoSink ? static_cast<double>(sinks[i]) * phi[i] : 0.; });
-  double escaped = 0.;
-  const std::array<int, 3>& n = this->box.dims;
-  for (int d = 0; d < 3; ++d)
+  // from the medium itself, as the residual
+  const auto weigh = [&](const auto& medium)
   {
-    for (int side = 0; side < 2; ++side)
+    if (!medium.D)
     {
-      const std::vector<float>& out = this->border[d][side];
-      if (out.empty())
+      return;
+    }
+    const auto inside = [&](std::int64_t i) { return !(medium.outside && medium.outside[i]); };
+    report.absorbed = V *
+      sum(
+        [&](std::int64_t i) {
+          return medium.sigma_a && inside(i) ? static_cast<double>(medium.sigma_a[i]) * phi[i] : 0.;
+        });
+    double escaped = 0.;
+    const std::array<int, 3>& n = this->box.dims;
+    for (int d = 0; d < 3; ++d)
+    {
+      const double h = this->box.spacing[d];
+      for (int side = 0; side < 2; ++side)
       {
-        continue;
-      }
-      const int u = d == 0 ? 1 : 0;
-      const int v = d == 2 ? 1 : 2;
-      int at[3];
-      at[d] = side ? n[d] - 1 : 0;
-      for (at[v] = 0; at[v] < n[v]; ++at[v])
-      {
-        for (at[u] = 0; at[u] < n[u]; ++at[u])
+        if (n[d] == 1 || medium.boundary == Boundary::ZeroFlux)
         {
-          escaped += static_cast<double>(out[static_cast<std::size_t>(this->borderIndex(d, at))]) *
-            phi[this->box.index(at[0], at[1], at[2])];
+          continue;
+        }
+        const int u = d == 0 ? 1 : 0;
+        const int v = d == 2 ? 1 : 2;
+        int at[3];
+        at[d] = side ? n[d] - 1 : 0;
+        for (at[v] = 0; at[v] < n[v]; ++at[v])
+        {
+          for (at[u] = 0; at[u] < n[u]; ++at[u])
+          {
+            const std::int64_t i = this->box.index(at[0], at[1], at[2]);
+            const double D = inside(i) ? static_cast<double>(medium.D[i]) : 0.;
+            escaped += D / (0.5 * h + this->twoA * D) / h * phi[i];
+          }
         }
       }
     }
-  }
-  report.escaped = escaped * V * this->scale;
-  report.absorbed = lost - report.escaped - report.leaked;
+    report.escaped = escaped * V;
+  };
+  weigh(this->floatMedium);
+  weigh(this->doubleMedium);
 }
 
 //------------------------------------------------------------------------------
@@ -1150,7 +1267,7 @@ DiffusionReport DiffusionSolver::solveSteady(
       }
     };
     darken(); // a start from elsewhere
-    RightHandSide<T> b{ q, 1. / this->scale };
+    RightHandSide<T> b{ q, 1. / this->scale, false };
     if (singular)
     {
       double sum = 0.;
@@ -1293,7 +1410,7 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
       active.assign(active.size(), 1); // nowhere to go: the whole volume tells
       continue;
     }
-    const RightHandSide<Q> b{ q, 1. / this->scale };
+    const RightHandSide<Q> b{ q, 1. / this->scale, false };
     report.leaked = 0.;
     this->conjugateGradients(b, phi, last ? rest : rough, 0., last ? 1. : 0., report);
     spent += report.fineApplications * static_cast<double>(activeSize) / static_cast<double>(size);
@@ -1397,7 +1514,7 @@ DiffusionReport DiffusionSolver::stepImplicit(
     report.message = "the time step c dt is not a positive length";
     return report;
   }
-  const RightHandSide<T> steady{ q, 1. / this->scale };
+  const RightHandSide<T> steady{ q, 1. / this->scale, true };
   const double qNorm = this->norm(steady);
   this->setShift(shifted);
   Buffer<double> previous(size);
@@ -1419,7 +1536,7 @@ DiffusionReport DiffusionSolver::stepImplicit(
         previous[i] += ahead * (phi[i] - previous[i]);
       }
     }
-    const RightHandSide<T> b{ q, 1. / this->scale, 0., previous.data(), this->A.s.data(),
+    const RightHandSide<T> b{ q, 1. / this->scale, true, 0., previous.data(), this->A.s.data(),
       this->sinkWithoutShift.data() };
     const double part = 1. / static_cast<double>(solves);
     this->conjugateGradients(b, phi, sharper, static_cast<double>(solve) * part,
@@ -1519,7 +1636,7 @@ DiffusionReport DiffusionSolver::march(
   const std::int64_t size = this->box.size();
   const int nx = this->box.dims[0];
   this->setShift(0.);
-  const RightHandSide<T> b{ q, 1. / this->scale };
+  const RightHandSide<T> b{ q, 1. / this->scale, true };
   const double qNorm = this->norm(b);
   Buffer<double> other(size);
   report.bytes =

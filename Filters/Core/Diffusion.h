@@ -89,7 +89,10 @@ struct DiffusionReport
   StopReason reason = StopReason::BadInput;
   std::string message; ///< for a person, where the reason alone does not say all
   int iterations = 0;
-  /** |b - A phi| / |b|, recomputed in double from phi; in time: of the steady equation. */
+  /**
+   * |b - A phi| / |b|, recomputed in double from phi and the medium; in time: of the steady
+   * equation with the float faces that the steps use.
+   */
   double residual = 0.;
   double seconds = 0.;    ///< this call, the set-up that it needed included
   std::int64_t bytes = 0; ///< held while solving, beyond the caller's arrays
@@ -141,7 +144,8 @@ public:
   explicit DiffusionSolver(ParallelFor parallelFor = SerialFor);
 
   /**
-   * Reads the medium once, keeps its operator (16 bytes per voxel). Answers
+   * Keeps the medium's operator, with float coefficients (16 bytes per voxel), and looks at the
+   * arrays again to recompute steady residuals: they must outlive the solves. Answers
    * BadInput, and says where, for a D or sigma_a that is negative or not finite.
    */
   template <class T>
@@ -222,6 +226,7 @@ private:
   {
     const T* q;
     double qScale;
+    bool ofSteps; ///< judged with the float faces that time steps step with
     double mean = 0.;
     const double* previous = nullptr;
     const float* shifted = nullptr;
@@ -242,6 +247,9 @@ private:
   /** |b - A phi|, and the residual divided by rScale in r where that is asked for. */
   template <class T>
   double residual(const RightHandSide<T>& b, const double* phi, float* r, double rScale) const;
+  template <class T>
+  void applyExactly(const DiffusionMedium<T>& medium, const double* phi, std::int64_t row,
+    std::int64_t o, int n, double* y) const;
   template <class T>
   double norm(const RightHandSide<T>& b) const;
   template <class T>
@@ -275,6 +283,10 @@ private:
   double scale = 1.;   // 1/length
   double largestDiagonal = 1.;
   double gershgorin = 1.; // bound of the largest eigenvalue, divided by scale
+  /** The caller's arrays, one of the two: what the residual is recomputed from. */
+  DiffusionMedium<float> floatMedium;
+  DiffusionMedium<double> doubleMedium;
+  double twoA = 0.; ///< of the Robin condition
   bool anySink = false;
   bool everySink = false;
   bool anyWall = false;
