@@ -40,6 +40,47 @@ double warmth(const Color& c)
 {
   return c[0] - c[2];
 }
+
+/** The same head in micrometres, millimetres and kilometres: the same picture. */
+void rescaledUnits(Suite& suite)
+{
+  vtkSmartPointer<vtkImageData> reference;
+  for (const double u : { 1., 1e3, 1e-6 })
+  {
+    auto head = makeGrid(N, N, N);
+    setScalars(head, phantom);
+    head->SetSpacing(u, u, u);
+    vtkNew<vtkOpticalMediumFilter> medium;
+    medium->SetInputData(head);
+    medium->SetGradientScale(12. / u);
+    vtkNew<vtkLightSeedFilter> seeds;
+    seeds->SetInputConnection(medium->GetOutputPort());
+    seeds->AddSphere(Right[0] * u, Right[1] * u, Right[2] * u, 1.5 * u, 1.);
+    seeds->AddSphere(Left[0] * u, Left[1] * u, Left[2] * u, 1.5 * u, -1.);
+    vtkNew<vtkLightDiffusionFilter> diffusion;
+    diffusion->SetInputConnection(seeds->GetOutputPort());
+    LitScene scene(head, 120, 120);
+    scene.mapper->SetLightFieldConnection(diffusion->GetOutputPort());
+    scene.mapper->SetSampleDistance(static_cast<float>(.5 * u));
+    scene.property->SetScalarOpacityUnitDistance(u);
+    scene.opacity->RemoveAllPoints();
+    scene.opacity->AddPoint(30., 0.);
+    scene.opacity->AddPoint(200., .08);
+    scene.look({ .2, 1., .4 });
+    const vtkSmartPointer<vtkImageData> picture = scene.capture();
+    if (!reference)
+    {
+      reference = picture;
+      double range[2];
+      picture->GetScalarRange(range);
+      LT_CHECK(suite, range[1] > 100.); // there is something to see
+    }
+    const Difference d = difference(picture, reference);
+    std::cout << "unit " << u << ": mean difference " << d.mean << ", largest " << d.largest
+              << "\n";
+    LT_CHECK(suite, d.mean < 0.2 && d.largest <= 6.);
+  }
+}
 } // namespace
 
 int main(int argc, char* argv[])
@@ -140,6 +181,7 @@ int main(int argc, char* argv[])
   writePicture(suite, lit, "VolumeMapperIlluminate");
   LT_CHECK(suite, at(lit, Left)[1] > 1.2 * at(lit, Right)[1]);
   LT_CHECK(suite, observer->all().empty());
+  rescaledUnits(suite);
   LT_CHECK(suite, openGLErrors().empty());
   return suite.result();
 }
