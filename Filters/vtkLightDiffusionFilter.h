@@ -149,7 +149,7 @@ public:
   ///@}
 
   ///@{
-  /** Of the linear solver (Implicit: in each step); >= 1, default 500. 10 to 20 are usual. */
+  /** Of the linear solver (Implicit: in each step); >= 1, default 500. 10 to 40 are usual. */
   vtkSetMacro(MaximumNumberOfIterations, int);
   vtkGetMacro(MaximumNumberOfIterations, int);
   ///@}
@@ -269,8 +269,9 @@ public:
   /**
    * Steady only: solve on tiles around the sources, grown while more than ActiveThreshold (of the
    * largest |phi|) stands at their border, with phi = 0 beyond: light that stays in a vessel does
-   * not cost the whole volume; light that fills a quarter of it is solved on the whole, for a few
-   * percent more. Fluence is 0 outside. Default off: the residual's equations hold everywhere.
+   * not cost the whole volume; light that fills a quarter of it is solved on the whole,
+   * after the rounds that found it. Fluence is 0 outside. Default off: the residual's equations
+   * hold everywhere.
    */
   vtkSetMacro(ActiveRegion, bool);
   vtkGetMacro(ActiveRegion, bool);

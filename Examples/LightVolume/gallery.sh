@@ -28,9 +28,9 @@ run()
 keep() { cp "$gallery/runs/$1" "$gallery/$2"; }
 
 seed=@84,126,90,2,1 # in the left lateral ventricle
-edges=(--gradient-scale 5 --reach 40)
+edges=(--gradient-scale 3.7 --reach 40)
 
-run ventricle --seed $seed "${edges[@]}" --albedo 0.997 --pictures plain,lit,slices,flux,arrows \
+run ventricle --seed $seed "${edges[@]}" --albedo 0.99 --pictures plain,lit,slices,flux,arrows \
   --title "Light in the left lateral ventricle"
 keep ventricle/plain.png 1-head.png
 keep ventricle/lit.png 2-ventricle.png
