@@ -14,7 +14,7 @@ lighttransport_build_packages="
   libsegyio-dev libvtk-dicom-dev"
 
 # To check them as well: formats, lints, and an X server without a screen.
-lighttransport_test_packages="git clang-format-14 clang-tidy-14 xvfb xauth"
+lighttransport_test_packages="git clang-format-14 clang-tidy-14 xvfb"
 
 # What the demo lights: an MR head.
 lighttransport_demo_packages="mricron-data"

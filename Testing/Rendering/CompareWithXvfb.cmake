@@ -3,11 +3,6 @@
 #
 # cmake -DPROGRAM=... -DFOLDER=... -P CompareWithXvfb.cmake
 # The same scene through EGL and through X has the same pixels, on the same driver.
-find_program(XVFB_RUN xvfb-run)
-if (NOT XVFB_RUN)
-  message("no xvfb-run here: skipped")
-  return ()
-endif ()
 set(egl "${FOLDER}/scene-egl.png")
 set(xvfb "${FOLDER}/scene-xvfb.png")
 file(REMOVE "${egl}" "${xvfb}")
@@ -20,8 +15,12 @@ endif ()
 if (NOT result EQUAL 0 OR NOT output MATCHES "vtkLightTransportEGLRenderWindow")
   message(FATAL_ERROR "through EGL: exit code ${result}, ${output}")
 endif ()
-execute_process(COMMAND "${XVFB_RUN}" -a "${PROGRAM}" -W "${xvfb}"
+execute_process(COMMAND sh "${CMAKE_CURRENT_LIST_DIR}/../Support/in-xvfb.sh" "${PROGRAM}" -W "${xvfb}"
   RESULT_VARIABLE result OUTPUT_VARIABLE output)
+if (result EQUAL 125)
+  message("no Xvfb here: skipped")
+  return ()
+endif ()
 if (NOT result EQUAL 0 OR NOT output MATCHES "vtkXOpenGLRenderWindow")
   message(FATAL_ERROR "through X: exit code ${result}, ${output}")
 endif ()
