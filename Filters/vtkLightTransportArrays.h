@@ -24,6 +24,16 @@ constexpr const char* Flux = "Flux";
  * indices from the extent's first point, the radius (length) and the power.
  */
 constexpr const char* LightSeeds = "LightSeeds";
+/**
+ * Curvatures of surfaces or of a volume's level sets, outward normals: a sphere of radius R has
+ * principal curvatures 1/R, their mean 1/R and their product 1/R^2.
+ */
+constexpr const char* PrincipalCurvature1 = "PrincipalCurvature1"; ///< the larger, 1/length
+constexpr const char* PrincipalCurvature2 = "PrincipalCurvature2"; ///< the smaller, 1/length
+constexpr const char* MeanCurvature = "MeanCurvature";             ///< (k1 + k2) / 2, 1/length
+constexpr const char* GaussianCurvature = "GaussianCurvature";     ///< k1 k2, 1/length^2
+/** In [0, 1], 1 is opaque. */
+constexpr const char* Opacity = "Opacity";
 } // namespace vtkLightTransportArrays
 
 #endif
