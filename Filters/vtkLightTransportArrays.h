@@ -19,6 +19,14 @@ constexpr const char* Source = "Source";
 constexpr const char* Fluence = "Fluence";
 /** E = -D grad(phi), three world components, in power/length^2. */
 constexpr const char* Flux = "Flux";
+/** sigma_t, in 1/length, >= 0. */
+constexpr const char* Extinction = "Extinction";
+/** Coefficients of v(p, w) on real orthonormal spherical harmonics, index l (l + 1) + m. */
+constexpr const char* VisibilitySH = "VisibilitySH";
+/** Visibility towards known lights, a component each, in [0, 1]. */
+constexpr const char* Visibility = "Visibility";
+/** The mean of v over the sphere, in [0, 1]. */
+constexpr const char* AmbientOcclusion = "AmbientOcclusion";
 /**
  * Field data of vtkLightSeedFilter's output, a tuple per sphere: the centre as continuous voxel
  * indices from the extent's first point, the radius (length) and the power.

@@ -392,10 +392,10 @@ public:
   }
 
   /** Plane m, voxel rows [begin, end). */
-  void rows(int m, int begin, int end, int order, bool add, float* sh, Scratch& scratch)
+  void rows(int m, int begin, int end, int order, bool add, float* sh, std::int64_t shStride,
+    Scratch& scratch)
   {
     const int n = this->view.n[0];
-    const int coefficients = NumberOfHarmonics(order);
     const int k = this->shears[0].plane(this->view, m);
     const int directions = static_cast<int>(this->shears.size());
     for (int r = begin; r <= end; ++r)
@@ -434,9 +434,9 @@ public:
       }
       if (r > begin)
       {
-        float* out = sh + coefficients * (k * this->view.out[2] + (r - 1) * this->view.out[1]);
+        float* out = sh + shStride * (k * this->view.out[2] + (r - 1) * this->view.out[1]);
         project(order, n, directions, scratch.v.data(), n, this->flatY.data(), add, out,
-          coefficients * this->view.out[0]);
+          shStride * this->view.out[0]);
       }
     }
   }
@@ -503,8 +503,8 @@ private:
 
 /** Sweeps a batch; `done` of `total` planes were finished before. */
 bool Sweep(const View& view, Batch& batch, int directions, int order, bool add, float* sh,
-  const ParallelFor& parallel, const ProgressFunction& progress, std::int64_t& done,
-  std::int64_t total)
+  std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress,
+  std::int64_t& done, std::int64_t total)
 {
   const int rows = view.n[1];
   const std::int64_t values = static_cast<std::int64_t>(rows) * view.n[0] * directions;
@@ -516,7 +516,7 @@ bool Sweep(const View& view, Batch& batch, int directions, int order, bool add, 
       {
         Scratch scratch(view.n[0], directions);
         batch.rows(m, static_cast<int>(begin) * RowsPerTask,
-          std::min(rows, static_cast<int>(end) * RowsPerTask), order, add, sh, scratch);
+          std::min(rows, static_cast<int>(end) * RowsPerTask), order, add, sh, stride, scratch);
       });
     done += directions;
     if (progress && !progress(static_cast<double>(done) / static_cast<double>(total)))
@@ -644,7 +644,7 @@ public:
     last = static_cast<int>(std::max(std::min(high, this->view.n[a] - 1.), -1.));
   }
 
-  bool run(float* v, const ParallelFor& parallel) const
+  bool run(float* v, std::int64_t stride, const ParallelFor& parallel) const
   {
     const Slopes rays(this->light[0], this->view.n[0] - 1, this->nearest, this->farthest);
     const Slopes rows(this->light[1], this->view.n[1] - 1, this->nearest, this->farthest);
@@ -656,7 +656,7 @@ public:
         for (std::int64_t task = begin; task < end; ++task)
         {
           const int first = static_cast<int>(task) * RowsPerTask;
-          this->rowsOf(rays, rows, first, std::min(rows.n - 1, first + RowsPerTask), v);
+          this->rowsOf(rays, rows, first, std::min(rows.n - 1, first + RowsPerTask), v, stride);
         }
       });
     return true;
@@ -664,7 +664,8 @@ public:
 
 private:
   /** The ray rows [begin, end] through all planes; the voxels between them. */
-  void rowsOf(const Slopes& rays, const Slopes& rows, int begin, int end, float* v) const
+  void rowsOf(
+    const Slopes& rays, const Slopes& rows, int begin, int end, float* v, std::int64_t stride) const
   {
     const int n = this->view.n[0];
     const int height = end - begin + 1;
@@ -730,14 +731,14 @@ private:
         expRow(rays.n, depth.data(), e.data() + width * r);
       }
       isFirst = false;
-      this->seePlane(rays, rows, begin, end, k, z, e, line, rayAt, rayW, seen, v);
+      this->seePlane(rays, rows, begin, end, k, z, e, line, rayAt, rayW, seen, v, stride);
     }
   }
 
   /** The voxels of a plane between the ray rows [begin, end]. */
   void seePlane(const Slopes& rays, const Slopes& rows, int begin, int end, int k, double z,
     const std::vector<float>& e, std::vector<float>& line, std::vector<int>& rayAt,
-    std::vector<float>& rayW, std::vector<float>& seen, float* v) const
+    std::vector<float>& rayW, std::vector<float>& seen, float* v, std::int64_t stride) const
   {
     int i0;
     int i1;
@@ -771,10 +772,10 @@ private:
       const float* lower = e.data() + width * (r - begin);
       blend(rays.n, g, lower, lower + width, line.data());
       gather(i1 - i0 + 1, rayAt.data(), rayW.data(), line.data(), seen.data());
-      float* out = v + k * this->view.out[2] + j * this->view.out[1];
+      float* out = v + stride * (k * this->view.out[2] + j * this->view.out[1]);
       for (int i = i0; i <= i1; ++i)
       {
-        out[i * this->view.out[0]] = seen[i - i0];
+        out[i * stride * this->view.out[0]] = seen[i - i0];
       }
     }
   }
@@ -999,7 +1000,7 @@ int DefaultNumberOfDirections(int order)
 
 //------------------------------------------------------------------------------
 bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 3>& w, float* v,
-  const ParallelFor& parallel, const ProgressFunction& progress)
+  std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress)
 {
   // One direction, whose "coefficient" is v itself.
   const int sweep = SweepAxis(medium.grid, w);
@@ -1014,12 +1015,12 @@ bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 
   Y[0][0] = 1.f;
   Batch batch(view, shears, Y, medium.radius);
   std::int64_t done = 0;
-  return Sweep(view, batch, 1, 0, false, v, parallel, progress, done, view.n[2]);
+  return Sweep(view, batch, 1, 0, false, v, stride, parallel, progress, done, view.n[2]);
 }
 
 //------------------------------------------------------------------------------
 bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<double, 3>& place,
-  float* v, const ParallelFor& parallel, const ProgressFunction& progress)
+  float* v, std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress)
 {
   const Grid& grid = medium.grid;
   Buffer<float> transposed;
@@ -1043,7 +1044,7 @@ bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<dou
           Transpose(medium, transposed.data(), parallel);
           view.sigma = transposed.data();
         }
-        pyramid.run(v, parallel);
+        pyramid.run(v, stride, parallel);
       }
       ++done;
       if (progress && !progress(done / 6.))
@@ -1064,14 +1065,14 @@ bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<dou
   }
   if (centre)
   {
-    v[grid.index(at[0], at[1], at[2])] = 1.f;
+    v[stride * grid.index(at[0], at[1], at[2])] = 1.f;
   }
   return true;
 }
 
 //------------------------------------------------------------------------------
 bool VisibilitySH(const VisibilityMedium& medium, const std::array<std::array<double, 3>, 3>& axes,
-  const DirectionSet& set, int order, float* sh, const ParallelFor& parallel,
+  const DirectionSet& set, int order, float* sh, std::int64_t stride, const ParallelFor& parallel,
   const ProgressFunction& progress)
 {
   // Directions by sweep, 2 axis + sense.
@@ -1121,8 +1122,8 @@ bool VisibilitySH(const VisibilityMedium& medium, const std::array<std::array<do
       shears.emplace_back(view, w);
     }
     Batch batch(view, shears, coefficients[group], medium.radius);
-    if (!Sweep(view, batch, static_cast<int>(shears.size()), order, add, sh, parallel, progress,
-          done, total))
+    if (!Sweep(view, batch, static_cast<int>(shears.size()), order, add, sh, stride, parallel,
+          progress, done, total))
     {
       return false;
     }

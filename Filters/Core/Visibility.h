@@ -85,11 +85,11 @@ DirectionSet MakeDirections(int n, int degree);
 int DefaultNumberOfDirections(int order);
 
 /**
- * v of every voxel towards a light in the direction w (grid axes, any length > 0).
- * False if `progress` (may be empty) asked to stop.
+ * v of every voxel towards a light in the direction w (grid axes, any length > 0),
+ * written every `stride` floats. False if `progress` (may be empty) asked to stop.
  */
 bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 3>& w, float* v,
-  const ParallelFor& parallel, const ProgressFunction& progress);
+  std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress);
 
 /**
  * v of every voxel towards a light at a place (lengths along the grid's axes from
@@ -97,11 +97,12 @@ bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 
  * at: what occludes lies between the voxel and the light.
  */
 bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<double, 3>& place,
-  float* v, const ParallelFor& parallel, const ProgressFunction& progress);
+  float* v, std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress);
 
 /**
  * The coefficients of v(p, .) on the harmonics up to `order` (0 to
- * HighestVisibilityOrder), NumberOfHarmonics(order) values per voxel side by side:
+ * HighestVisibilityOrder), NumberOfHarmonics(order) values side by side per voxel, every `stride`
+ * floats:
  *
  *   v_lm = sum_i weight_i v(p, w_i) Y_lm(w_i).
  *
@@ -110,7 +111,7 @@ bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<dou
  * result, and a transposed copy of sigma_t. Throws std::bad_alloc.
  */
 bool VisibilitySH(const VisibilityMedium& medium, const std::array<std::array<double, 3>, 3>& axes,
-  const DirectionSet& directions, int order, float* sh, const ParallelFor& parallel,
+  const DirectionSet& directions, int order, float* sh, std::int64_t stride, const ParallelFor& parallel,
   const ProgressFunction& progress);
 } // namespace lighttransport
 

@@ -48,7 +48,7 @@ Values sample(const Grid& grid, const F& f)
 Values towards(const Grid& grid, const Values& sigma_t, const Vector& w)
 {
   Values v(sigma_t.size(), -1.f);
-  VisibilityTowards({ grid, sigma_t.data(), 0. }, w, v.data(), SerialFor, nullptr);
+  VisibilityTowards({ grid, sigma_t.data(), 0. }, w, v.data(), 1, SerialFor, nullptr);
   return v;
 }
 
@@ -56,7 +56,7 @@ Values coefficients(const Grid& grid, const Values& sigma_t, int order, int dire
 {
   Values sh(sigma_t.size() * NumberOfHarmonics(order), -1.f);
   VisibilitySH({ grid, sigma_t.data(), 0. }, Straight, MakeDirections(directions, 2 * order), order,
-    sh.data(), SerialFor, nullptr);
+    sh.data(), NumberOfHarmonics(order), SerialFor, nullptr);
   return sh;
 }
 
@@ -247,7 +247,7 @@ void rays(Suite& suite)
     Vector light{ { 16. + 40. * uniform(random), 11. + 30. * uniform(random),
       17. + 40. * uniform(random) } };
     Values u(sigma_t.size(), -1.f);
-    VisibilityTowardsPoint({ grid, sigma_t.data(), 0. }, light, u.data(), SerialFor, nullptr);
+    VisibilityTowardsPoint({ grid, sigma_t.data(), 0. }, light, u.data(), 1, SerialFor, nullptr);
     LT_CHECK(suite, *std::min_element(u.begin(), u.end()) >= 0.f);
     LT_CHECK(suite, *std::max_element(u.begin(), u.end()) <= 1.f);
     for (int q = 0; q < 100; ++q)
