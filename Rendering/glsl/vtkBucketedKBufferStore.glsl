@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// vtkBucketedKBufferPass, geometry stage, in the fragment shader of every
+// translucent prop. Serves VTK::DepthPeeling::Dec; VTK::DepthPeeling::Impl calls
+// ltStore. Defined before: vtkBucketedKBufferData.glsl.
+
+uniform sampler2D ltOpaqueDepth; // DC, of this viewport
+uniform int ltWidth;             // of the viewport, in pixels
+uniform int ltCapacity;          // of the buffers, in nodes
+uniform int ltClampColor;        // 1: the picture holds colours in [0,1]
+uniform int ltShape;             // style << 24 | the prop's first shape
+uniform int ltThin;              // 1: points or wireframe
+
+// A fragment on an opaque surface is in front of it, as with GL_LEQUAL: half a
+// step of a 24-bit depth buffer.
+const float ltDepthTolerance = 3.0e-8;
+
+void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
+{
+  ivec2 p = ivec2(gl_FragCoord.xy);
+  depthDC = clamp(depthDC, 0.0, 1.0);
+  if (depthDC > texelFetch(ltOpaqueDepth, p, 0).r + ltDepthTolerance)
+  {
+    return;
+  }
+  uint node = atomicAdd(ltCounter[0], 1u);
+  if (node >= uint(ltCapacity))
+  {
+    return; // the stage is run again with room for all
+  }
+  color.a = clamp(color.a, 0.0, 1.0);
+  color.rgb = ltClampColor != 0 ? clamp(color.rgb, 0.0, 1.0) : clamp(color.rgb, 0.0, 65504.0);
+  ltSetColor(node, color);
+#if LT_STYLE
+  ltSurface[node] = uvec2(uint(ltShape) + shape, normalVC);
+#endif
+  uint next = atomicExchange(ltHead[p.y * ltWidth + p.x], node);
+  ltLink[node] = uvec2(next, floatBitsToUint(depthDC) << 1 | uint(ltThin));
+}

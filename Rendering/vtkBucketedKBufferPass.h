@@ -1,0 +1,189 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * @class   vtkBucketedKBufferPass
+ * @brief   exact order-independent transparency of many layers
+ *
+ * Translucent surfaces blended in their right order at every pixel, whatever
+ * the order of the actors, in one pass over the geometry. The fragments of a
+ * pixel are kept, so that each can be seen together with its neighbours on the
+ * same shape: what the bucketed k-buffer of Murray, Baril and Granier, "Shape
+ * Depiction for Transparent Objects with Bucketed k-Buffer" (Eurographics
+ * Symposium on Rendering, 2016) is for.
+ *
+ * @code
+ *   vtkNew<vtkBucketedKBufferPass> pass;
+ *   renderer->SetPass(pass);          // draws all the rest by VTK's own passes
+ * @endcode
+ *
+ * or as the translucent step of another sequence, where it draws nothing else:
+ *
+ * @code
+ *   vtkNew<vtkRenderStepsPass> steps;
+ *   steps->SetTranslucentPass(pass);
+ *   toneMapping->SetDelegatePass(steps);
+ *   renderer->SetPass(toneMapping);
+ * @endcode
+ *
+ * Each frame runs through these stages:
+ *
+ * 1. the opaque depth is copied, so that fragments behind it are left out;
+ * 2. geometry: the translucent props are drawn once by their own mappers, with
+ *    all that these can do (textures, vertex colours, edges, physically based
+ *    shading, clipping); each fragment becomes a node of its pixel's list. If
+ *    the nodes do not fit, the buffers grow and the stage is run again; if they
+ *    fit into no buffer (GL_MAX_SHADER_STORAGE_BLOCK_SIZE, MemoryLimit), the
+ *    viewport is drawn in as many horizontal bands as needed;
+ * 3. blending: the NumberOfLayers nearest nodes of each pixel are sorted and
+ *    blended front to back with "over" (Porter and Duff 1984), what is behind
+ *    them is merged into one layer.
+ *
+ * The thesis (Murray 2018, section 2.3.2) draws the geometry twice, to keep 16
+ * bits of depth and 16 of shape in one atomic word. Lists need one pass, full
+ * 32-bit depths and memory only for the fragments that exist.
+ *
+ * Exactness: the result does not depend on the order of actors or of triangles,
+ * to the bit. Fragments of equal depth are ordered by what they show. The merged
+ * tail of n fragments has opacity 1 - prod(1 - alpha_i) and colour
+ * sum(alpha_i c_i) / sum(alpha_i), in integer sums (colours above 16 count as
+ * 16; 65536 fragments at most), and GetNumberOfMergedFragments says how many
+ * there were.
+ *
+ * The picture is blended over the target as premultiplied colour, so that a
+ * transparent background stays so. Colours are clamped to [0,1] where the target
+ * is.
+ *
+ * Needs OpenGL 4.3, no fragment interlock. Where that is missing, or the viewport
+ * has more pixels than a buffer can hold, it says so once and lets
+ * vtkDualDepthPeelingPass draw, with as many layers.
+ *
+ * Lines and points are in the same lists, without a second look at a point or an
+ * edge that several triangles of a wireframe draw.
+ *
+ * Not for: volumes, which are drawn after the surfaces as VTK does by default;
+ * antialiasing (like VTK's own translucent passes it samples once per pixel).
+ * Hardware selection is VTK's own.
+ *
+ * @sa vtkDualDepthPeelingPass vtkOrderIndependentTranslucentPass
+ */
+#ifndef vtkBucketedKBufferPass_h
+#define vtkBucketedKBufferPass_h
+
+#include "vtkLightTransportRenderingModule.h" // for the export macro
+#include "vtkOpenGLRenderPass.h"
+
+#include <memory> // for the implementation
+
+class VTKLIGHTTRANSPORTRENDERING_EXPORT vtkBucketedKBufferPass : public vtkOpenGLRenderPass
+{
+public:
+  static vtkBucketedKBufferPass* New();
+  vtkTypeMacro(vtkBucketedKBufferPass, vtkOpenGLRenderPass);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  /** Not to be called by users. */
+  void Render(const vtkRenderState* s) override;
+  void ReleaseGraphicsResources(vtkWindow* window) override;
+
+  ///@{
+  /**
+   * How many fragments of a pixel are blended exactly, from 1 to 64 (clamped);
+   * those behind are merged. 16 by default. Memory does not depend on it.
+   */
+  vtkSetClampMacro(NumberOfLayers, int, 1, 64);
+  vtkGetMacro(NumberOfLayers, int);
+  ///@}
+
+  /** How a fragment's colour is kept. */
+  enum ColorPrecisions
+  {
+    Half = 0,
+    Float = 1
+  };
+
+  ///@{
+  /**
+   * Half (default): 16 bits a channel, RGBA, which 32 layers in an 8-bit picture
+   * do not tell from Float, 32 bits a channel.
+   */
+  vtkSetClampMacro(ColorPrecision, int, Half, Float);
+  vtkGetMacro(ColorPrecision, int);
+  void SetColorPrecisionToHalf() { this->SetColorPrecision(Half); }
+  void SetColorPrecisionToFloat() { this->SetColorPrecision(Float); }
+  ///@}
+
+  ///@{
+  /**
+   * Most bytes of GPU memory for fragments, at least 1 MiB (clamped). Where a
+   * frame needs more, it is drawn in bands, each a pass over the geometry.
+   * Default: 1 GiB.
+   */
+  vtkSetClampMacro(MemoryLimit, vtkTypeInt64, 1 << 20, VTK_TYPE_INT64_MAX);
+  vtkGetMacro(MemoryLimit, vtkTypeInt64);
+  ///@}
+
+  ///@{
+  /**
+   * Draws the translucent props; a vtkTranslucentPass by default, and for nullptr.
+   */
+  virtual void SetTranslucentPass(vtkRenderPass* pass);
+  vtkRenderPass* GetTranslucentPass();
+  ///@}
+
+  ///@{
+  /**
+   * Of the last frame: fragments kept, those that were merged into tails, bands,
+   * passes over the translucent geometry, bytes of all buffers, and bits per
+   * fragment.
+   */
+  vtkGetMacro(NumberOfFragments, vtkTypeInt64);
+  vtkTypeInt64 GetNumberOfMergedFragments();
+  vtkGetMacro(NumberOfBands, int);
+  vtkGetMacro(NumberOfGeometryPasses, int);
+  vtkTypeInt64 GetMemoryInBytes();
+  int GetBitsPerFragment();
+  ///@}
+
+  /**
+   * Whether the last frame was drawn by vtkDualDepthPeelingPass for want of
+   * OpenGL 4.3.
+   */
+  vtkGetMacro(UsedFallback, bool);
+
+  ///@{
+  /** Not to be called by users: what the translucent props' shaders get. */
+  bool PostReplaceShaderValues(std::string& vertexShader, std::string& geometryShader,
+    std::string& fragmentShader, vtkAbstractMapper* mapper, vtkProp* prop) override;
+  bool SetShaderParameters(vtkShaderProgram* program, vtkAbstractMapper* mapper, vtkProp* prop,
+    vtkOpenGLVertexArrayObject* VAO = nullptr) override;
+  vtkMTimeType GetShaderStageMTime() override;
+  ///@}
+
+protected:
+  vtkBucketedKBufferPass();
+  ~vtkBucketedKBufferPass() override;
+
+  int NumberOfLayers = 16;
+  int ColorPrecision = Half;
+  vtkTypeInt64 MemoryLimit = vtkTypeInt64(1) << 30;
+  vtkTypeInt64 NumberOfFragments = 0;
+  int NumberOfBands = 0;
+  int NumberOfGeometryPasses = 0;
+  bool UsedFallback = false;
+
+private:
+  class vtkInternals;
+  class vtkTranslucentStep;
+  friend class vtkTranslucentStep;
+  std::unique_ptr<vtkInternals> Internals;
+
+  void RenderEverything(const vtkRenderState* s);
+  void RenderTranslucent(const vtkRenderState* s);
+  void RenderFallback(const vtkRenderState* s, const std::string& reason);
+  bool RenderBand(const vtkRenderState* s, int first, int last);
+
+  vtkBucketedKBufferPass(const vtkBucketedKBufferPass&) = delete;
+  void operator=(const vtkBucketedKBufferPass&) = delete;
+};
+
+#endif
