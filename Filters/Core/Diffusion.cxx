@@ -92,6 +92,28 @@ void applyDouble(const DoubleRow& row, double* LIGHTTRANSPORT_RESTRICT y)
   }
 }
 
+/** z = r / diagonal */
+void divideByDiagonal(
+  const DiffusionOperator& A, const float* r, float* z, const ParallelFor& parallelFor)
+{
+  const std::int64_t nx = A.dims[0];
+  const std::int64_t ny = A.dims[1];
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    {
+      const float* gx = A.g[0].data() + o;
+      const float* gy = A.g[1].data() + o;
+      const float* gyS = row % ny > 0 ? gy - nx : A.zeros.data();
+      const float* gz = A.g[2].data() + o;
+      const float* gzB = row / ny > 0 ? gz - nx * ny : A.zeros.data();
+      const float* s = A.s.data() + o;
+      for (int i = 0; i < n; ++i)
+      {
+        z[o + i] = r[o + i] / (gx[i] + gx[i - 1] + gy[i] + gyS[i] + gz[i] + gzB[i] + s[i]);
+      }
+    });
+}
+
 /** tau = step / diagonal, 0 where there is none. */
 void localSteps(const DoubleRow& row, double step, double* LIGHTTRANSPORT_RESTRICT tau)
 {
@@ -968,6 +990,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     //    since a cycle in float is not quite linear
     double rzNew = 0.;
     double zAp = 0.;
+    const auto dots = [&]
     {
       std::vector<double> partial(2 * static_cast<std::size_t>(op.numberOfRows()));
       ForRows(loop, op.numberOfRows(), op.activeSize,
@@ -982,16 +1005,26 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
               partial.data() + 2 * t);
           }
         });
+      rzNew = zAp = 0.;
       for (std::size_t i = 0; i < partial.size(); i += 2)
       {
         rzNew += partial[i];
         zAp += partial[i + 1];
       }
-    }
+    };
+    dots();
     if (cancelled)
     {
       cancel();
       return;
+    }
+    if (std::isfinite(rzNew) && !(rzNew > 0.))
+    {
+      // The coarse operators are not Galerkin's: where one is far too weak, the correction
+      // overshoots. A step along r / diagonal always gains.
+      divideByDiagonal(op, r.data(), z.data(), loop);
+      restart = true;
+      dots();
     }
     if (!std::isfinite(rzNew) || !(rzNew > 0.))
     {
