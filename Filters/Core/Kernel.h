@@ -24,7 +24,7 @@
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) &&       \
   !defined(LIGHTTRANSPORT_SANITIZED)
 #define LIGHTTRANSPORT_SIMD                                                                        \
-  __attribute__((target_clones("default", "arch=haswell", "arch=skylake-avx512")))
+  __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else
 #define LIGHTTRANSPORT_SIMD
 #endif
