@@ -29,7 +29,14 @@ constexpr int RowsPerTask = 16;
 /** exp(-t) for t >= 0, to 2e-7; exactly 1 at 0, and a number above 0 however large t is. */
 LIGHTTRANSPORT_INLINE float expMinus(float t)
 {
-  const float x = -1.44269504f * (t < 87.f ? t : 87.f);
+  // The lesser of t and 86 by their bits, which order as the numbers do: a comparison of
+  // floats could trap, and would keep the compiler from doing several at once.
+  std::int32_t bits;
+  std::memcpy(&bits, &t, sizeof(bits));
+  bits = bits < 0x42ac0000 ? bits : 0x42ac0000;
+  float x;
+  std::memcpy(&x, &bits, sizeof(x));
+  x *= -1.44269504f;
   const int n = static_cast<int>(x - 0.5f); // rounds, as x <= 0
   const float f = x - static_cast<float>(n);
   const float p = 1.f +
@@ -39,7 +46,7 @@ LIGHTTRANSPORT_INLINE float expMinus(float t)
           (0.240226507f +
             f *
               (0.0555041087f + f * (0.00961812911f + f * (0.00133335581f + f * 0.000154035304f)))));
-  const std::int32_t bits = (n + 127) << 23;
+  bits = (n + 127) << 23;
   float scale;
   std::memcpy(&scale, &bits, sizeof(scale));
   return p * scale;
@@ -244,14 +251,15 @@ View MakeView(const VisibilityMedium& medium, int sweep, const float* transposed
   return view;
 }
 
-/** sigma_t with x and z exchanged. */
-void Transpose(const VisibilityMedium& medium, float* out, const ParallelFor& parallel)
+/** A grid's values with x and z exchanged, in tiles; from and to every `stride` values. */
+void Transpose(const std::array<int, 3>& dims, const float* in, std::int64_t inStride, float* out,
+  std::int64_t outStride, const ParallelFor& parallel)
 {
-  const std::int64_t nx = medium.grid.dims[0];
-  const std::int64_t ny = medium.grid.dims[1];
-  const std::int64_t nz = medium.grid.dims[2];
-  constexpr std::int64_t tile = 16;
-  ForRows(parallel, ny, medium.grid.size(),
+  const std::int64_t nx = dims[0];
+  const std::int64_t ny = dims[1];
+  const std::int64_t nz = dims[2];
+  constexpr std::int64_t tile = 8; // more, and a power of 2 of rows evict each other
+  ForRows(parallel, ny, nx * ny * nz,
     [&](std::int64_t begin, std::int64_t end)
     {
       for (std::int64_t j = begin; j < end; ++j)
@@ -264,7 +272,7 @@ void Transpose(const VisibilityMedium& medium, float* out, const ParallelFor& pa
             {
               for (std::int64_t k = k0; k < std::min(nz, k0 + tile); ++k)
               {
-                out[k + nz * (j + ny * i)] = medium.sigma_t[i + nx * (j + ny * k)];
+                out[outStride * (k + nz * (j + ny * i))] = in[inStride * (i + nx * (j + ny * k))];
               }
             }
           }
@@ -556,6 +564,10 @@ struct Slopes
   }
   double at(int i) const { return this->first + i * this->step; }
   double ray(double slope) const { return (slope - this->first) / this->step; }
+  int clamped(double ray) const
+  {
+    return static_cast<int>(std::min(std::max(ray, 0.), this->n - 1.));
+  }
 };
 
 /** sigma_t at a place, in voxels; zero a voxel beyond the border. */
@@ -700,7 +712,11 @@ private:
     for (const int k : this->planes)
     {
       const double z = std::abs(k - this->light[2]);
-      for (int i = 0; i < rays.n; ++i)
+      // Rays beside the volume are left alone: no voxel lies between them, and once they
+      // left it they do not come back.
+      const int i0 = rays.clamped(std::floor(rays.ray((-1. - this->light[0]) / z)));
+      const int i1 = rays.clamped(std::ceil(rays.ray((n - this->light[0]) / z))) + 1;
+      for (int i = i0; i < i1; ++i)
       {
         // `line` has a zero before and after the row.
         Locate(this->light[0] + rays.at(i) * z + 1., n, at[i], w[i]);
@@ -708,6 +724,10 @@ private:
       for (int r = 0; r < height; ++r)
       {
         const double y = this->light[1] + rows.at(begin + r) * z;
+        if (!(y > -1.001 && y < this->view.n[1] + 0.001))
+        {
+          continue;
+        }
         const double low = std::floor(y);
         const auto row = [&](double j) {
           return j >= 0. && j < this->view.n[1] ? this->view.row(static_cast<int>(j), k)
@@ -716,19 +736,20 @@ private:
         blend(n, static_cast<float>(y - low), row(low), row(low + 1.), line.data() + 1);
         line[0] = 0.f;
         line[n + 1] = 0.f;
-        gather(rays.n, at.data(), w.data(), line.data(), sigma.data());
-        float* u = U.data() + width * r;
-        const float* step = steps.data() + width * r;
+        gather(i1 - i0, at.data() + i0, w.data() + i0, line.data(), sigma.data());
+        const std::size_t first = width * r + i0;
+        float* u = U.data() + first;
+        const float* step = steps.data() + first;
         if (isFirst)
         {
           startOpening(
-            rays.n, static_cast<float>(part), start, step, sigma.data(), u, depth.data());
+            i1 - i0, static_cast<float>(part), start, step, sigma.data(), u, depth.data());
         }
         else
         {
-          crossOpening(rays.n, step, sigma.data(), u, depth.data());
+          crossOpening(i1 - i0, step, sigma.data(), u, depth.data());
         }
-        expRow(rays.n, depth.data(), e.data() + width * r);
+        expRow(i1 - i0, depth.data(), e.data() + first);
       }
       isFirst = false;
       this->seePlane(rays, rows, begin, end, k, z, e, line, rayAt, rayW, seen, v, stride);
@@ -752,6 +773,8 @@ private:
     j1 = static_cast<int>(std::min(static_cast<double>(j1), std::max(high, j0 - 1.)));
     const std::size_t width = static_cast<std::size_t>(rays.n);
     bool located = false;
+    int from = 0;
+    int to = 0;
     for (int j = j0; j <= j1; ++j)
     {
       int r;
@@ -768,9 +791,11 @@ private:
           Locate(rays.ray((i - this->light[0]) / z), rays.n - 2, rayAt[i - i0], rayW[i - i0]);
         }
         located = true;
+        from = i0 <= i1 ? rayAt[0] : 0;
+        to = i0 <= i1 ? rayAt[i1 - i0] + 2 : 0;
       }
-      const float* lower = e.data() + width * (r - begin);
-      blend(rays.n, g, lower, lower + width, line.data());
+      const float* lower = e.data() + width * (r - begin) + from;
+      blend(to - from, g, lower, lower + width, line.data() + from);
       gather(i1 - i0 + 1, rayAt.data(), rayW.data(), line.data(), seen.data());
       float* out = v + stride * (k * this->view.out[2] + j * this->view.out[1]);
       for (int i = i0; i <= i1; ++i)
@@ -1007,15 +1032,31 @@ bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 
   Buffer<float> transposed(sweep == 0 ? medium.grid.size() : 0);
   if (sweep == 0)
   {
-    Transpose(medium, transposed.data(), parallel);
+    Transpose(medium.grid.dims, medium.sigma_t, 1, transposed.data(), 1, parallel);
   }
-  const View view = MakeView(medium, sweep, transposed.data());
+  View view = MakeView(medium, sweep, transposed.data());
+  // Along x the result, too, is transposed first: writing it across would take longer.
+  const std::array<int, 3>& n = view.n;
+  Buffer<float> across(sweep == 0 ? medium.grid.size() : 0);
+  if (sweep == 0)
+  {
+    view.out = { { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] } };
+  }
   const std::vector<Shear> shears = { Shear(view, w) };
   std::vector<std::array<float, MaxHarmonics>> Y(1);
   Y[0][0] = 1.f;
   Batch batch(view, shears, Y, medium.radius);
   std::int64_t done = 0;
-  return Sweep(view, batch, 1, 0, false, v, stride, parallel, progress, done, view.n[2]);
+  if (!Sweep(view, batch, 1, 0, false, sweep == 0 ? across.data() : v, sweep == 0 ? 1 : stride,
+        parallel, progress, done, n[2]))
+  {
+    return false;
+  }
+  if (sweep == 0)
+  {
+    Transpose(n, across.data(), 1, v, stride, parallel);
+  }
+  return true;
 }
 
 //------------------------------------------------------------------------------
@@ -1041,7 +1082,7 @@ bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<dou
         if (sweep == 0 && transposed.empty())
         {
           transposed.allocate(grid.size());
-          Transpose(medium, transposed.data(), parallel);
+          Transpose(medium.grid.dims, medium.sigma_t, 1, transposed.data(), 1, parallel);
           view.sigma = transposed.data();
         }
         pyramid.run(v, stride, parallel);
@@ -1105,7 +1146,7 @@ bool VisibilitySH(const VisibilityMedium& medium, const std::array<std::array<do
   if (!directions[0].empty() || !directions[1].empty())
   {
     transposed.allocate(medium.grid.size());
-    Transpose(medium, transposed.data(), parallel);
+    Transpose(medium.grid.dims, medium.sigma_t, 1, transposed.data(), 1, parallel);
   }
   std::int64_t done = 0;
   bool add = false;

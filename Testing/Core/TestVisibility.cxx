@@ -52,11 +52,12 @@ Values towards(const Grid& grid, const Values& sigma_t, const Vector& w)
   return v;
 }
 
-Values coefficients(const Grid& grid, const Values& sigma_t, int order, int directions)
+Values coefficients(const Grid& grid, const Values& sigma_t, int order, int directions,
+  double radius = 0., const ParallelFor& parallel = SerialFor)
 {
   Values sh(sigma_t.size() * NumberOfHarmonics(order), -1.f);
-  VisibilitySH({ grid, sigma_t.data(), 0. }, Straight, MakeDirections(directions, 2 * order), order,
-    sh.data(), NumberOfHarmonics(order), SerialFor, nullptr);
+  VisibilitySH({ grid, sigma_t.data(), radius }, Straight, MakeDirections(directions, 2 * order),
+    order, sh.data(), NumberOfHarmonics(order), parallel, nullptr);
   return sh;
 }
 
@@ -274,6 +275,335 @@ void rays(Suite& suite)
   LT_CHECK(suite, worst[0] < 0.02);
   LT_CHECK(suite, worst[1] < 0.02);
 }
+
+Vector unit(const Vector& w)
+{
+  const double length = std::sqrt(dot(w, w));
+  return { { w[0] / length, w[1] / length, w[2] / length } };
+}
+
+/** Layers: the depth is that of the distance along the ray, whatever the angle. */
+void layers(Suite& suite)
+{
+  // A half-space x < 15.5 voxels, seen from the middle of a wide grid.
+  const Grid grid{ { { 40, 61, 61 } }, { { 0.7, 1., 0.8 } } };
+  const Values half = sample(grid, [](int i, int, int) { return i < 16 ? 0.11 : 0.; });
+  // A plate of one voxel, and the same mass within one plane.
+  const Values plate = sample(grid, [](int i, int, int) { return i == 20 ? 0.6 : 0.; });
+  for (const Vector& direction : { Vector{ { -1., 0.1, 0.2 } }, Vector{ { -1., -0.9, 0.3 } },
+         Vector{ { -1., 0.5, -0.6 } }, Vector{ { -0.8, 1., 0.1 } } })
+  {
+    const Vector w = unit(direction);
+    const Values v = towards(grid, half, w);
+    const Values u = towards(grid, plate, w);
+    double worst[2] = { 0., 0. };
+    for (int i = 6; i < 40; ++i)
+    {
+      const double inside = std::min(i + 0.5, 16.) * 0.7;
+      // Only where the ray leaves through the face x = 0.
+      const double aside = (i + 0.5) * 0.7 * std::max(std::abs(w[1]), std::abs(w[2]) / 0.8) / -w[0];
+      if (aside < 29. && (i < 14 || i > 17))
+      {
+        worst[0] =
+          std::max(worst[0], std::abs(v[grid.index(i, 30, 30)] - std::exp(-0.11 * inside / -w[0])));
+      }
+      if (aside < 29. && std::abs(i - 20) > 1)
+      {
+        const double expected = i > 20 ? std::exp(-0.6 * 0.7 / -w[0]) : 1.;
+        worst[1] = std::max(worst[1], std::abs(u[grid.index(i, 30, 30)] - expected));
+      }
+    }
+    // The voxels' linear interpolation rounds the face; nothing of it grows with the distance.
+    LT_CHECK_NEAR(suite, worst[0], 0., 0.005);
+    LT_CHECK_NEAR(suite, worst[1], 0., 0.03);
+  }
+
+  // A ball, from its centre.
+  const int n = 49;
+  const Grid cube{ { { n, n, n } }, { { 0.5, 0.5, 0.5 } } };
+  const Values ball = sample(cube,
+    [](int i, int j, int k)
+    {
+      const double r = std::hypot(i - 24., std::hypot(j - 24., k - 24.));
+      return 0.2 * std::min(1., std::max(0., 20.5 - r)); // radius 20 voxels, tau = 2
+    });
+  const Values sh = coefficients(cube, ball, 4, 144);
+  const float* centre = sh.data() + 25 * cube.index(24, 24, 24);
+  LT_CHECK_NEAR(suite, centre[0], std::sqrt(4. * Pi) * std::exp(-2.), 0.01);
+  for (int c = 1; c < 25; ++c)
+  {
+    LT_CHECK_NEAR(suite, centre[c], 0., 0.004);
+  }
+}
+
+/** A shadow stays as wide as its occluder, however far it falls: nothing diffuses. */
+void sharp(Suite& suite)
+{
+  const Grid grid{ { { 40, 40, 120 } }, { { 1., 1., 1. } } };
+  const Values bar =
+    sample(grid, [](int i, int, int k) { return k == 115 && i >= 10 && i < 14 ? 50. : 0.; });
+  const Vector w{ { 0.07, 0., 1. } };
+  const Values v = towards(grid, bar, w);
+  double before = 0.;
+  for (int k : { 110, 60, 4 })
+  {
+    double shadow = 0.;
+    float darkest = 1.f;
+    double second = 0.;
+    double first = 0.;
+    for (int i = 0; i < 40; ++i)
+    {
+      const double dark = 1. - v[grid.index(i, 20, k)];
+      const double x = i + 0.07 * (115 - k);
+      shadow += dark;
+      first += dark * x;
+      second += dark * x * x;
+      darkest = std::min(darkest, v[grid.index(i, 20, k)]);
+    }
+    const double mean = first / shadow;
+    const double width = std::sqrt(second / shadow - mean * mean);
+    // Where an edge lies is known to half a ray, and stays where it is.
+    LT_CHECK_NEAR(suite, mean, 11.5, 0.5);
+    LT_CHECK(suite, k == 110 || std::abs(mean - before) < 0.01);
+    before = mean;
+    LT_CHECK(suite, darkest < 1e-3f);
+    // 3 between its outer voxels; beyond them a depth of 50 (1 - t): 1 - 1/50 on either side.
+    LT_CHECK_NEAR(suite, shadow, 4.96, 0.1);
+    LT_CHECK_NEAR(suite, width, shadow / std::sqrt(12.), 0.15);
+  }
+}
+
+/** Voxels of random extinction, and a checkerboard: the mean error of v. */
+void checkerboard(Suite& suite)
+{
+  const Grid grid{ { { 40, 36, 32 } }, { { 1., 1., 1. } } };
+  const Values board =
+    sample(grid, [](int i, int j, int k) { return (i / 8 + j / 8 + k / 8) % 2 ? 0.1 : 0.; });
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0., 0.9999);
+  double sum = 0.;
+  int count = 0;
+  for (const Vector& w : MakeDirections(24, 2).directions)
+  {
+    const Values v = towards(grid, board, w);
+    for (int q = 0; q < 40; ++q)
+    {
+      const int i = static_cast<int>(uniform(random) * grid.dims[0]);
+      const int j = static_cast<int>(uniform(random) * grid.dims[1]);
+      const int k = static_cast<int>(uniform(random) * grid.dims[2]);
+      sum += std::abs(v[grid.index(i, j, k)] -
+        testing::castVisibility(grid, board.data(), { { double(i), double(j), double(k) } }, w));
+      ++count;
+    }
+  }
+  std::cout << "mean error on a checkerboard: " << sum / count << "\n";
+  LT_CHECK(suite, sum / count < 0.01);
+}
+
+void invariants(Suite& suite)
+{
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(0., 0.2);
+  const Grid grid{ { { 21, 18, 24 } }, { { 1., 0.9, 1.3 } } };
+  Values sigma_t(grid.size());
+  for (float& s : sigma_t)
+  {
+    s = static_cast<float>(uniform(random));
+  }
+  const Vector w{ { 0.4, -0.7, 0.5 } };
+  const Values v = towards(grid, sigma_t, w);
+
+  // Lengths scaled, extinction scaled back.
+  Grid large = grid;
+  Values thin = sigma_t;
+  for (double& h : large.spacing)
+  {
+    h *= 8.;
+  }
+  for (float& s : thin)
+  {
+    s /= 8.f;
+  }
+  const Values scaled = towards(large, thin, w);
+  // Mirrored along y; the three axes exchanged in a circle.
+  Values mirror(sigma_t.size());
+  const Grid circle{ { { grid.dims[2], grid.dims[0], grid.dims[1] } },
+    { { grid.spacing[2], grid.spacing[0], grid.spacing[1] } } };
+  Values turned(sigma_t.size());
+  const auto forEach = [&](const auto& f)
+  {
+    for (int k = 0; k < grid.dims[2]; ++k)
+    {
+      for (int j = 0; j < grid.dims[1]; ++j)
+      {
+        for (int i = 0; i < grid.dims[0]; ++i)
+        {
+          f(grid.index(i, j, k), grid.index(i, grid.dims[1] - 1 - j, k), circle.index(k, i, j));
+        }
+      }
+    }
+  };
+  forEach(
+    [&](std::int64_t here, std::int64_t there, std::int64_t round)
+    {
+      mirror[there] = sigma_t[here];
+      turned[round] = sigma_t[here];
+    });
+  const Values mirrored = towards(grid, mirror, { { w[0], -w[1], w[2] } });
+  const Values round = towards(circle, turned, { { w[2], w[0], w[1] } });
+  // A light very far away is a direction.
+  Values far(sigma_t.size());
+  VisibilityTowardsPoint(
+    { grid, sigma_t.data(), 0. }, { { 4e6, -7e6, 5e6 } }, far.data(), 1, SerialFor, nullptr);
+  double worst[4] = { 0., 0., 0., 0. };
+  double mean = 0.;
+  forEach(
+    [&](std::int64_t here, std::int64_t there, std::int64_t at)
+    {
+      const double value = v[here];
+      worst[0] = std::max(worst[0], std::abs(value - scaled[here]));
+      worst[1] = std::max(worst[1], std::abs(value - mirrored[there]));
+      worst[2] = std::max(worst[2], std::abs(value - round[at]));
+      mean += std::abs(value - far[here]) / static_cast<double>(v.size());
+    });
+  LT_CHECK_NEAR(suite, worst[0], 0., 2e-6);
+  LT_CHECK_NEAR(suite, worst[1], 0., 2e-6);
+  LT_CHECK_NEAR(suite, worst[2], 0., 2e-6);
+  LT_CHECK_NEAR(suite, mean, 0., 0.01); // its lattice lies elsewhere between the voxels
+
+  // However it is split.
+  const Values sh = coefficients(grid, sigma_t, 2, 64);
+  LT_CHECK(suite, sh == coefficients(grid, sigma_t, 2, 64, 0., testing::ThreadedFor(3)));
+  const Grid big{ { { 70, 66, 64 } }, { { 1., 1., 1. } } };
+  const Values many =
+    sample(big, [](int i, int j, int k) { return ((i * 31 + j * 17 + k * 7) % 10) * 0.01; });
+  LT_CHECK(suite,
+    coefficients(big, many, 1, 12, 9.5) ==
+      coefficients(big, many, 1, 12, 9.5, testing::ThreadedFor(4)));
+  const Vector place{ { 20., 30., 100. } };
+  Values serial(many.size());
+  Values threaded(many.size());
+  VisibilityTowardsPoint({ big, many.data(), 0. }, place, serial.data(), 1, SerialFor, nullptr);
+  VisibilityTowardsPoint(
+    { big, many.data(), 0. }, place, threaded.data(), 1, testing::ThreadedFor(3), nullptr);
+  LT_CHECK(suite, serial == threaded);
+
+  // Read through the window, v lies in [0, 1] whatever the direction.
+  for (int order = 1; order <= HighestVisibilityOrder; ++order)
+  {
+    // Opaque sheets, where raw harmonics ring.
+    const Values sheets =
+      sample(grid, [](int i, int j, int k) { return i % 7 == 3 || j + k == 20 ? 30. : 0.; });
+    const Values c = coefficients(grid, sheets, order, DefaultNumberOfDirections(order));
+    const std::vector<double> k = VisibilityWindow(order);
+    double lowest[2] = { 1., 1. };
+    double highest[2] = { 0., 0. };
+    for (const Vector& direction : MakeDirections(50, 1).directions)
+    {
+      double Y[25];
+      SphericalHarmonics(order, direction, Y);
+      for (std::int64_t voxel = 0; voxel < grid.size(); voxel += 7)
+      {
+        double raw = 0.;
+        double read = 0.;
+        for (int l = 0; l <= order; ++l)
+        {
+          for (int m = -l; m <= l; ++m)
+          {
+            const int at = l * (l + 1) + m;
+            const double term = c[voxel * NumberOfHarmonics(order) + at] * Y[at];
+            raw += term;
+            read += k[l] * term;
+          }
+        }
+        lowest[0] = std::min(lowest[0], raw);
+        highest[0] = std::max(highest[0], raw);
+        lowest[1] = std::min(lowest[1], read);
+        highest[1] = std::max(highest[1], read);
+      }
+    }
+    LT_CHECK(suite, lowest[1] >= -1e-5 && highest[1] <= 1. + 1e-5);
+    LT_CHECK(suite, lowest[0] < -0.02); // and needs it
+  }
+}
+
+void radius(Suite& suite)
+{
+  // In a box: up to the radius, or to the border where that is nearer.
+  const Grid grid{ { { 30, 26, 22 } }, { { 1., 0.8, 1.5 } } };
+  const double s = 0.06;
+  const Values box = sample(grid, [s](int, int, int) { return s; });
+  for (const Vector& direction : { Vector{ { 0., 0., 1. } }, Vector{ { -1., 0., 0. } },
+         Vector{ { 0.5, 0.3, -0.8 } }, Vector{ { -0.9, 0.4, 0.2 } } })
+  {
+    const Vector w = unit(direction);
+    for (double r : { 0.3, 2.5, 6., 11.3 })
+    {
+      Values v(box.size(), -1.f);
+      VisibilityTowards({ grid, box.data(), r }, w, v.data(), 1, SerialFor, nullptr);
+      LT_CHECK_NEAR(
+        suite, v[grid.index(15, 13, 11)], std::exp(-s * std::min(r, 10.)), r < 10. ? 2e-6 : 0.06);
+      const Vector p{ { 15., 13. * 0.8, 11. * 1.5 } };
+      LT_CHECK_NEAR(suite, v[grid.index(15, 13, 11)],
+        testing::castVisibility(grid, box.data(), p, w, 0.05, r), 0.003);
+    }
+    // Far enough, it is as if there were none.
+    const Values all = towards(grid, box, w);
+    Values v(box.size(), -1.f);
+    VisibilityTowards({ grid, box.data(), 1e4 }, w, v.data(), 1, SerialFor, nullptr);
+    LT_CHECK(suite, v == all);
+  }
+  // Around a wall: seen from closer than the radius, not from beyond.
+  const Values wall = sample(grid, [](int i, int, int) { return i == 20 ? 100. : 0.; });
+  Values v(box.size(), -1.f);
+  VisibilityTowards(
+    { grid, wall.data(), 6. }, { { 1., 0.1, 0. } }, v.data(), 1, SerialFor, nullptr);
+  LT_CHECK_NEAR(suite, v[grid.index(16, 13, 11)], 0., 1e-6);
+  LT_CHECK_NEAR(suite, v[grid.index(11, 13, 11)], 1., 1e-6);
+  const Values sh = coefficients(grid, box, 1, 48, 3.);
+  LT_CHECK_NEAR(
+    suite, sh[4 * grid.index(15, 13, 11)], std::sqrt(4. * Pi) * std::exp(-s * 3.), 1e-4);
+}
+
+void cancel(Suite& suite)
+{
+  const Grid grid{ { { 20, 20, 20 } }, { { 1., 1., 1. } } };
+  const Values box = sample(grid, [](int, int, int) { return 0.1; });
+  Values v(box.size());
+  Values sh(box.size() * 9);
+  for (int calls : { 1, 3, 5 })
+  {
+    int left = calls;
+    double last = 0.;
+    const ProgressFunction stop = [&](double fraction)
+    {
+      last = fraction;
+      return --left > 0;
+    };
+    const VisibilityMedium medium{ grid, box.data(), 0. };
+    LT_CHECK(suite,
+      !VisibilitySH(medium, Straight, MakeDirections(64, 4), 2, sh.data(), 9, SerialFor, stop));
+    LT_CHECK(suite, left == 0 && last > 0. && last < 0.2);
+    left = calls;
+    LT_CHECK(suite, !VisibilityTowards(medium, { { 1., 0., 0. } }, v.data(), 1, SerialFor, stop));
+    LT_CHECK(suite, left == 0);
+    left = calls;
+    LT_CHECK(
+      suite, !VisibilityTowardsPoint(medium, { { 1., 0., 0. } }, v.data(), 1, SerialFor, stop));
+    LT_CHECK(suite, left == 0);
+  }
+  double last = 0.;
+  LT_CHECK(suite,
+    VisibilitySH({ grid, box.data(), 0. }, Straight, MakeDirections(64, 4), 2, sh.data(), 9,
+      SerialFor,
+      [&last](double fraction)
+      {
+        const bool grows = fraction > last && fraction <= 1.;
+        last = fraction;
+        return grows;
+      }));
+  LT_CHECK_NEAR(suite, last, 1., 1e-12);
+}
 } // namespace
 
 int main(int argc, char* argv[])
@@ -285,5 +615,11 @@ int main(int argc, char* argv[])
   window(suite);
   closedForms(suite);
   rays(suite);
+  layers(suite);
+  sharp(suite);
+  checkerboard(suite);
+  invariants(suite);
+  radius(suite);
+  cancel(suite);
   return suite.result();
 }
