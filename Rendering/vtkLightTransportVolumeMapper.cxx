@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkLightTransportVolumeMapper.h"
 
+#include "VolumeLighting.h"
 #include "vtkLightFieldProperty.h"
 #include "vtkLightTransportArrays.h"
 #include "vtkLightTransportCompat.h"
 #include "vtkLightTransportVolumeMapperDec.h"
+#include "vtkLightTransportVolumeMapperLighting.h"
+#include "vtkLightTransportVolumeMapperLightingDec.h"
+#include "vtkLightTransportVolumeMapperRay.h"
 #include "vtkLightTransportVolumeMapperRayBegin.h"
 #include "vtkLightTransportVolumeMapperRayEnd.h"
 #include "vtkLightTransportVolumeMapperSampleAfter.h"
@@ -19,6 +23,8 @@
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationObjectBaseVectorKey.h"
+#include "vtkLight.h"
+#include "vtkLightCollection.h"
 #include "vtkMath.h"
 #include "vtkMatrix4x4.h"
 #include "vtkMultiVolume.h"
@@ -40,6 +46,8 @@
 #include "vtkTrivialProducer.h"
 #include "vtkVersion.h"
 #include "vtkVolume.h"
+#include "vtkVolumeLightingProperty.h"
+#include "vtkVolumeProperty.h"
 
 // GLEW or glad, by VTK's version.
 #include LIGHTTRANSPORT_GL_HEADER
@@ -152,6 +160,59 @@ void readScaled(const T* values, vtkIdType count, double top, ScaledField& field
 }
 
 //------------------------------------------------------------------------------
+/**
+ * VTK's shading takes six lights and writes beyond the end of its arrays with more (9.1 to 9.6,
+ * SetLightingShaderParameters): for the time of a render it sees the first six. Can go when VTK
+ * bounds them.
+ */
+class SixLights
+{
+public:
+  SixLights(vtkRenderer* renderer, vtkVolume* volume)
+  {
+    vtkLightCollection* lights = renderer->GetLights();
+    if (!volume->GetProperty()->GetShade() || lights->GetNumberOfItems() <= 6)
+    {
+      return;
+    }
+    vtkNew<vtkLightCollection> first;
+    vtkCollectionSimpleIterator iterator;
+    lights->InitTraversal(iterator);
+    while (vtkLight* light = lights->GetNextLight(iterator))
+    {
+      if (light->GetSwitch() && first->GetNumberOfItems() < 6)
+      {
+        first->AddItem(light);
+      }
+    }
+    this->Renderer = renderer;
+    this->Few = first;
+    this->All = lights;
+  }
+  void Hide()
+  {
+    if (this->Renderer)
+    {
+      this->Renderer->SetLightCollection(this->Few);
+    }
+  }
+  ~SixLights()
+  {
+    if (this->Renderer)
+    {
+      this->Renderer->SetLightCollection(this->All);
+    }
+  }
+  SixLights(const SixLights&) = delete;
+  SixLights& operator=(const SixLights&) = delete;
+
+private:
+  vtkRenderer* Renderer = nullptr;
+  vtkSmartPointer<vtkLightCollection> Few;
+  vtkSmartPointer<vtkLightCollection> All;
+};
+
+//------------------------------------------------------------------------------
 /** The whole pipeline upstream of a port; false where it fails. */
 bool updateWhole(vtkAlgorithm* producer, int port, vtkMTimeType& pipelineTime)
 {
@@ -224,11 +285,15 @@ public:
 
   // 3. the shader
   vtkNew<vtkShaderPass> Pass;
-  int ShaderMode = -1;
+  VolumeLighting Lighting;
+  bool HasField = false;    // this frame's
+  bool HasLighting = false;
+  std::string ShaderHead; // the preprocessor's symbols
   std::string FailedTag;
   vtkMTimeType FailedShaderTime = 0;
 
   std::string LastProblem;
+  std::string LastLightingProblem;
   bool WarnedMultiVolume = false;
   bool WarnedDepthPass = false;
   unsigned short Partitions[3] = { 1, 1, 1 };
@@ -260,9 +325,23 @@ bool vtkLightTransportVolumeMapper::vtkShaderPass::PreReplaceShaderValues(
   ++this->Mapper->NumberOfShaderBuilds;
   vtkInternals& self = *this->Mapper->Internals;
 
-  std::ostringstream head;
-  head << "#define LT_MODE " << self.ShaderMode << "\n#define LT_BLEND "
-       << blendClass(this->Mapper->GetBlendMode()) << "\n";
+  // What a sample is made of, in the order in which it is computed.
+  std::string declarations = self.ShaderHead + vtkLightTransportVolumeMapperRay;
+  std::string initialization = "\n";
+  std::string lighting;
+  std::string colorEnd;
+  if (self.HasField)
+  {
+    declarations += vtkLightTransportVolumeMapperDec;
+    initialization += "  ltInitField(ltTCToData());\n";
+  }
+  if (self.HasLighting)
+  {
+    declarations += vtkLightTransportVolumeMapperLightingDec;
+    lighting = vtkLightTransportVolumeMapperLighting;
+    colorEnd = "\n#undef clamp\n";
+    initialization += "  ltInitLighting(ltTCToData());\n";
+  }
 
   struct Part
   {
@@ -272,8 +351,9 @@ bool vtkLightTransportVolumeMapper::vtkShaderPass::PreReplaceShaderValues(
     bool all; // also where a user's replacement repeats the tag
   };
   const Part parts[] = {
-    { "//VTK::ComputeLighting::Dec", head.str() + vtkLightTransportVolumeMapperDec, "", false },
-    { "//VTK::Base::Init", "", "\n  ltInitRay();\n", false },
+    { "//VTK::ComputeLighting::Dec", declarations, "\n" + lighting, false },
+    { "//VTK::ComputeColor::Dec", "", colorEnd, false },
+    { "//VTK::Base::Init", "", initialization, false },
     { "//VTK::Shading::Init", "", vtkLightTransportVolumeMapperRayBegin, true },
     { "//VTK::Shading::Impl", vtkLightTransportVolumeMapperSampleBefore,
       vtkLightTransportVolumeMapperSampleAfter, true },
@@ -306,6 +386,14 @@ bool vtkLightTransportVolumeMapper::vtkShaderPass::SetShaderParameters(
   }
   vtkInternals& self = *this->Mapper->Internals;
   if (!self.FailedTag.empty())
+  {
+    return true;
+  }
+  if (self.HasLighting)
+  {
+    self.Lighting.SetUniforms(program);
+  }
+  if (!self.HasField)
   {
     return true;
   }
@@ -588,6 +676,36 @@ vtkLightFieldProperty* vtkLightTransportVolumeMapper::GetLightFieldProperty()
 }
 
 //------------------------------------------------------------------------------
+void vtkLightTransportVolumeMapper::SetLightingProperty(vtkVolumeLightingProperty* property)
+{
+  this->Internals->Lighting.Property = property;
+}
+
+//------------------------------------------------------------------------------
+vtkVolumeLightingProperty* vtkLightTransportVolumeMapper::GetLightingProperty()
+{
+  return this->Internals->Lighting.Property;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportVolumeMapper::SetVisibilityConnection(vtkAlgorithmOutput* output)
+{
+  this->Internals->Lighting.SetVisibilityConnection(output);
+}
+
+//------------------------------------------------------------------------------
+int vtkLightTransportVolumeMapper::GetNumberOfVisibilityUploads()
+{
+  return this->Internals->Lighting.NumberOfUploads;
+}
+
+//------------------------------------------------------------------------------
+int vtkLightTransportVolumeMapper::GetNumberOfVisibilityComputations()
+{
+  return this->Internals->Lighting.NumberOfComputations;
+}
+
+//------------------------------------------------------------------------------
 double vtkLightTransportVolumeMapper::GetLightFieldMaximum()
 {
   return this->Internals->Maximum;
@@ -651,11 +769,13 @@ bool vtkLightTransportVolumeMapper::VolumeFits(vtkRenderer* renderer)
 }
 
 //------------------------------------------------------------------------------
-bool vtkLightTransportVolumeMapper::PrepareLight(vtkRenderer* renderer, vtkVolume* volume)
+bool vtkLightTransportVolumeMapper::CanBeLit(vtkRenderer* renderer, vtkVolume* volume)
 {
   vtkInternals& self = *this->Internals;
-  vtkLightFieldProperty* property = self.Property;
-  if (!self.Producer || property->GetStrength() <= 0. || renderer->GetSelector() ||
+  const bool hasField = self.Producer && self.Property->GetStrength() > 0.;
+  vtkVolumeLightingProperty* lighting = self.Lighting.Property;
+  const bool hasLighting = lighting && lighting->GetStrength() > 0.;
+  if ((!hasField && !hasLighting) || renderer->GetSelector() ||
     blendClass(this->GetBlendMode()) == NoLight)
   {
     return false;
@@ -686,6 +806,18 @@ bool vtkLightTransportVolumeMapper::PrepareLight(vtkRenderer* renderer, vtkVolum
       return false;
     }
     self.FailedTag.clear();
+  }
+  return true;
+}
+
+//------------------------------------------------------------------------------
+bool vtkLightTransportVolumeMapper::PrepareField(vtkRenderer* renderer)
+{
+  vtkInternals& self = *this->Internals;
+  vtkLightFieldProperty* property = self.Property;
+  if (!self.Producer || property->GetStrength() <= 0.)
+  {
+    return false;
   }
 
   // 1. the pipeline. One that failed is tried again when something upstream changed.
@@ -776,12 +908,7 @@ bool vtkLightTransportVolumeMapper::PrepareLight(vtkRenderer* renderer, vtkVolum
     ++this->NumberOfColorMapUploads;
   }
 
-  // 3. the shader and this frame's uniforms
-  if (self.ShaderMode != property->GetMode())
-  {
-    self.ShaderMode = property->GetMode();
-    self.Pass->StageTime.Modified();
-  }
+  // 3. this frame's uniforms
   self.ComputeDatasetToFC();
   double unit = property->GetLightOpacityUnitDistance();
   if (unit == 0.)
@@ -800,10 +927,43 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
   {
     return;
   }
-  if (!this->PrepareLight(renderer, volume))
+  SixLights sixLights(renderer, volume);
+  self.HasField = false;
+  self.HasLighting = false;
+  if (this->CanBeLit(renderer, volume))
+  {
+    self.HasField = this->PrepareField(renderer);
+    std::string problem;
+    // Light of the field shows where nothing else does.
+    const bool skips =
+      !self.HasField || self.Property->GetMode() == vtkLightFieldProperty::Illuminate;
+    self.HasLighting =
+      self.Lighting.Prepare(this, renderer, volume, self.HasField, skips, problem);
+    if (self.HasLighting && problem != self.LastLightingProblem)
+    {
+      self.LastLightingProblem = problem;
+      if (!problem.empty())
+      {
+        vtkErrorMacro(<< problem);
+      }
+    }
+  }
+  sixLights.Hide();
+  if (!self.HasField && !self.HasLighting)
   {
     this->Superclass::GPURender(renderer, volume);
     return;
+  }
+  std::ostringstream head;
+  head << "#define LT_FIELD " << self.HasField << "\n#define LT_LIGHTING " << self.HasLighting
+       << "\n#define LT_MODE " << (self.HasField ? self.Property->GetMode() : -1)
+       << "\n#define LT_BLEND " << blendClass(this->GetBlendMode()) << "\n"
+       << (self.HasLighting ? self.Lighting.Defines()
+                            : "#define LT_DEFERRED 0\n#define LT_SKIPS 0\n");
+  if (self.ShaderHead != head.str())
+  {
+    self.ShaderHead = head.str();
+    self.Pass->StageTime.Modified();
   }
 
   vtkInformation* keys = volume->GetPropertyKeys();
@@ -831,6 +991,7 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
   }
   self.FieldTexture->Deactivate();
   self.MapTexture->Deactivate();
+  self.Lighting.Deactivate();
 
   if (!self.FailedTag.empty())
   {
@@ -846,6 +1007,7 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
 void vtkLightTransportVolumeMapper::ReleaseGraphicsResources(vtkWindow* window)
 {
   this->Internals->Release(window);
+  this->Internals->Lighting.Release(window);
   this->Superclass::ReleaseGraphicsResources(window);
 }
 
@@ -861,4 +1023,5 @@ void vtkLightTransportVolumeMapper::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "NumberOfShaderBuilds: " << this->NumberOfShaderBuilds << "\n";
   os << indent << "LightFieldProperty:\n";
   this->Internals->Property->PrintSelf(os, indent.GetNextIndent());
+  os << indent << "LightingProperty: " << this->Internals->Lighting.Property.Get() << "\n";
 }

@@ -71,6 +71,7 @@
 class vtkAlgorithmOutput;
 class vtkImageData;
 class vtkLightFieldProperty;
+class vtkVolumeLightingProperty;
 
 class VTKLIGHTTRANSPORTRENDERING_EXPORT vtkLightTransportVolumeMapper
   : public vtkOpenGLGPUVolumeRayCastMapper
@@ -103,6 +104,23 @@ public:
 
   ///@{
   /**
+   * How the volume is lit, shadows included; nullptr (default): as VTK shades it.
+   * Setting it does not count as a modification of the mapper.
+   */
+  virtual void SetLightingProperty(vtkVolumeLightingProperty* property);
+  vtkVolumeLightingProperty* GetLightingProperty();
+  ///@}
+
+  /**
+   * A visibility of one's own: an image with the point array "VisibilitySH" of a
+   * vtkVisibilityFactorFilter and, for exact shadows of scene lights, "Extinction"
+   * (OutputExtinctionOn). nullptr (default): the mapper computes it from what it
+   * draws, masks, cropping and clipping included, whenever that changes.
+   */
+  virtual void SetVisibilityConnection(vtkAlgorithmOutput* output);
+
+  ///@{
+  /**
    * Fields of at most this many bytes as 32-bit floats are kept so on the GPU,
    * others in 16-bit floats, which hold nine decades below the maximum at 3 digits
    * and draw faster. Default: 0, all in 16 bits. Holds from the next upload on.
@@ -122,6 +140,8 @@ public:
   vtkGetMacro(NumberOfLightFieldUploads, int);
   vtkGetMacro(NumberOfColorMapUploads, int);
   vtkGetMacro(NumberOfShaderBuilds, int);
+  int GetNumberOfVisibilityUploads();
+  int GetNumberOfVisibilityComputations();
   ///@}
 
   void ReleaseGraphicsResources(vtkWindow* window) override;
@@ -144,7 +164,8 @@ private:
   std::unique_ptr<vtkInternals> Internals;
 
   bool VolumeFits(vtkRenderer* renderer);
-  bool PrepareLight(vtkRenderer* renderer, vtkVolume* volume);
+  bool CanBeLit(vtkRenderer* renderer, vtkVolume* volume);
+  bool PrepareField(vtkRenderer* renderer);
   void ReportOnce(const std::string& problem);
 
   vtkLightTransportVolumeMapper(const vtkLightTransportVolumeMapper&) = delete;

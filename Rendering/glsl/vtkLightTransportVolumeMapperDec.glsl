@@ -4,7 +4,7 @@
 // Tag:     VTK::ComputeLighting::Dec, before it.
 // Needs:   LT_MODE (0 Overlay, 1 Illuminate, 2 FluxDirection), LT_BLEND (0 composite
 //          and isosurface, 1 slice, 2 maximum, 3 minimum intensity); from VTK's
-//          declarations in_textureDatasetMatrix, in_cellToPoint, in_sampleDistance.
+//          declarations in_sampleDistance.
 // Defines: the functions and globals lt...; positions are TC, the texture
 //          coordinates of the volume (as g_dataPos), or FC, those of the field.
 
@@ -30,19 +30,9 @@ uniform float in_ltTissueOpacity;
 
 mat4 g_ltTCToFC;
 
-// Affine: TC -> dataset -> FC. VTK's TC have half a voxel less at either end for
-// point data; in_cellToPoint (a scale and a shift) undoes that.
-void ltInitRay()
+void ltInitField(mat4 TCToData)
 {
-  vec3 scale = vec3(in_cellToPoint[0][0][0], in_cellToPoint[0][1][1], in_cellToPoint[0][2][2]);
-  // A single slice of points has no extent, and a scale of 0.
-  scale = mix(vec3(1.0) / max(scale, vec3(1e-20)), vec3(0.0), equal(scale, vec3(0.0)));
-  mat4 pointToCell = mat4(1.0);
-  pointToCell[0][0] = scale.x;
-  pointToCell[1][1] = scale.y;
-  pointToCell[2][2] = scale.z;
-  pointToCell[3].xyz = -scale * in_cellToPoint[0][3].xyz;
-  g_ltTCToFC = in_ltDatasetToFC * in_textureDatasetMatrix[0] * pointToCell;
+  g_ltTCToFC = in_ltDatasetToFC * TCToData;
 }
 
 // The field at a sample; 0 outside the field's own domain.

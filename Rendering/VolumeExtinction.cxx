@@ -1,0 +1,532 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "VolumeExtinction.h"
+
+#include "vtkCollection.h"
+#include "vtkDataArray.h"
+#include "vtkFloatArray.h"
+#include "vtkGPUVolumeRayCastMapper.h"
+#include "vtkImageData.h"
+#include "vtkMatrix3x3.h"
+#include "vtkMatrix4x4.h"
+#include "vtkNew.h"
+#include "vtkPiecewiseFunction.h"
+#include "vtkPlane.h"
+#include "vtkPlaneCollection.h"
+#include "vtkPointData.h"
+#include "vtkSMPTools.h"
+#include "vtkSmartPointer.h"
+#include "vtkVolume.h"
+#include "vtkVolumeProperty.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+
+namespace
+{
+constexpr int TableSize = 4096;
+/** An opacity of 1 has no extinction; this is 9.2 unit distances of optical depth each. */
+constexpr double MostOpaque = .9999;
+
+//------------------------------------------------------------------------------
+/** A function of a value in [lo, hi], sampled; constant beyond. */
+struct Table
+{
+  double lo = 0.;
+  double scale = 0.; // entries per unit of the value
+  std::vector<double> entries;
+
+  Table() = default;
+  Table(vtkPiecewiseFunction* function, double lowest, double highest)
+    : lo(lowest)
+    , scale(highest > lowest ? (TableSize - 1) / (highest - lowest) : 0.)
+    , entries(TableSize)
+  {
+    function->GetTable(lowest, std::max(highest, lowest), TableSize, this->entries.data());
+  }
+  double operator()(double value) const
+  {
+    const double x = (value - this->lo) * this->scale + .5;
+    // Also false for a NaN.
+    const int i = x > 0. ? (x < TableSize - 1. ? static_cast<int>(x) : TableSize - 1) : 0;
+    return this->entries[i];
+  }
+};
+
+//------------------------------------------------------------------------------
+/** The volume's scalars as the mapper takes them. */
+struct Scalars
+{
+  vtkImageData* image = nullptr;
+  vtkSmartPointer<vtkDataArray> array;
+  int dimensions[3] = { 0, 0, 0 };
+  double first[3] = { 0., 0., 0. }; // index of the first value: of a point, or a cell's middle
+};
+
+bool findScalars(vtkGPUVolumeRayCastMapper* mapper, Scalars& scalars)
+{
+  scalars.image = vtkImageData::SafeDownCast(mapper->GetDataSetInput());
+  if (!scalars.image)
+  {
+    return false;
+  }
+  int cellFlag = 0;
+  scalars.array = vtkAbstractMapper::GetScalars(scalars.image, mapper->GetScalarMode(),
+    mapper->GetArrayAccessMode(), mapper->GetArrayId(), mapper->GetArrayName(), cellFlag);
+  int extent[6];
+  scalars.image->GetExtent(extent);
+  const bool cells = cellFlag == 1;
+  vtkIdType count = 1;
+  for (int a = 0; a < 3; ++a)
+  {
+    scalars.dimensions[a] = extent[2 * a + 1] - extent[2 * a] + (cells ? 0 : 1);
+    scalars.first[a] = extent[2 * a] + (cells ? .5 : 0.);
+    count *= scalars.dimensions[a];
+  }
+  return scalars.array && count > 0 && scalars.array->GetNumberOfTuples() == count;
+}
+
+//------------------------------------------------------------------------------
+/** What the volume's property makes of values: opacity per unit distance. */
+struct Classifier
+{
+  int components = 1;
+  bool independent = false;
+  int opacityComponent = 0; // of dependent ones
+  double unitDistance = 1.;
+  double weights[4] = { 1., 1., 1., 1. };
+  double ranges[4][2] = {};
+  Table opacity[4];
+  bool byGradient[4] = { false, false, false, false };
+  Table gradientOpacity[4];
+  vtkImageData* transfer2D[4] = { nullptr, nullptr, nullptr, nullptr };
+
+  // masks
+  vtkSmartPointer<vtkDataArray> mask;
+  bool labels = false;
+  double blend = 1.;
+  std::map<int, Table> labelOpacity;
+
+  bool needsGradient() const
+  {
+    return std::any_of(this->byGradient, this->byGradient + 4, [](bool b) { return b; });
+  }
+
+  double opacityOf(int c, double value, double gradient) const
+  {
+    if (vtkImageData* function = this->transfer2D[c])
+    {
+      int size[3];
+      function->GetDimensions(size);
+      const double range = this->ranges[c][1] - this->ranges[c][0];
+      const double steepest = .25 * range;
+      const double x = range > 0. ? (value - this->ranges[c][0]) / range : 0.;
+      const double y = steepest > 0. ? gradient / steepest : 0.;
+      const auto index = [](double t, int n)
+      { return t > 0. ? (t < 1. ? static_cast<int>(t * n) : n - 1) : 0; };
+      return static_cast<const float*>(function->GetScalarPointer(
+        index(x, size[0]), index(y, size[1]), 0))[3];
+    }
+    const double a = this->opacity[c](value);
+    return this->byGradient[c] ? a * this->gradientOpacity[c](gradient) : a;
+  }
+};
+
+void prepareMask(vtkGPUVolumeRayCastMapper* mapper, vtkVolumeProperty* property,
+  const Scalars& scalars, Classifier& classifier)
+{
+  vtkImageData* mask = mapper->GetMaskInput();
+  vtkDataArray* values = mask ? mask->GetPointData()->GetScalars() : nullptr;
+  if (!values || values->GetNumberOfTuples() != scalars.array->GetNumberOfTuples())
+  {
+    return;
+  }
+  classifier.mask = values;
+  classifier.labels = mapper->GetMaskType() == vtkGPUVolumeRayCastMapper::LabelMapMaskType;
+  classifier.blend = mapper->GetMaskBlendFactor();
+  if (classifier.labels)
+  {
+    double range[2];
+    values->GetRange(range);
+    for (int label = 1; label <= static_cast<int>(std::min(range[1], 1024.)); ++label)
+    {
+      if (vtkPiecewiseFunction* function = property->GetLabelScalarOpacity(label))
+      {
+        classifier.labelOpacity.emplace(
+          label, Table(function, classifier.ranges[0][0], classifier.ranges[0][1]));
+      }
+    }
+  }
+}
+
+Classifier makeClassifier(
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolumeProperty* property, const Scalars& scalars)
+{
+  Classifier classifier;
+  classifier.components = std::min(scalars.array->GetNumberOfComponents(), 4);
+  classifier.independent = classifier.components > 1 && property->GetIndependentComponents();
+  classifier.unitDistance = property->GetScalarOpacityUnitDistance();
+  classifier.opacityComponent = classifier.independent ? 0 : classifier.components - 1;
+  const bool twoDimensional =
+    property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D;
+  const int functions = classifier.independent ? classifier.components : 1;
+  for (int c = 0; c < classifier.components; ++c)
+  {
+    scalars.array->GetFiniteRange(classifier.ranges[c], c);
+  }
+  for (int f = 0; f < functions; ++f)
+  {
+    const double* range = classifier.ranges[classifier.independent ? f : classifier.opacityComponent];
+    classifier.weights[f] = property->GetComponentWeight(f);
+    vtkImageData* function = twoDimensional ? property->GetTransferFunction2D(f) : nullptr;
+    if (function && function->GetScalarType() == VTK_FLOAT &&
+      function->GetNumberOfScalarComponents() == 4 && function->GetNumberOfPoints() > 0)
+    {
+      classifier.transfer2D[f] = function;
+      classifier.byGradient[f] = true;
+      continue;
+    }
+    classifier.opacity[f] = Table(property->GetScalarOpacity(f), range[0], range[1]);
+    if (!twoDimensional && property->HasGradientOpacity(f) &&
+      !property->GetDisableGradientOpacity(f))
+    {
+      classifier.byGradient[f] = true;
+      classifier.gradientOpacity[f] =
+        Table(property->GetGradientOpacity(f), 0., .25 * (range[1] - range[0]));
+    }
+  }
+  prepareMask(mapper, property, scalars, classifier);
+  return classifier;
+}
+
+//------------------------------------------------------------------------------
+/** What cropping and clipping leave, by the point's index. */
+struct Cuts
+{
+  bool cropping = false;
+  double planes[6] = {};
+  int flags = 0;
+  std::vector<std::array<double, 4>> halfSpaces; // of the index: >= 0 is kept
+  std::array<double, 12> indexToData = {};
+
+  bool any() const { return this->cropping || !this->halfSpaces.empty(); }
+  bool keeps(const double index[3]) const
+  {
+    for (const auto& h : this->halfSpaces)
+    {
+      if (h[0] * index[0] + h[1] * index[1] + h[2] * index[2] + h[3] < 0.)
+      {
+        return false;
+      }
+    }
+    if (!this->cropping)
+    {
+      return true;
+    }
+    int region = 0;
+    for (int a = 0, step = 1; a < 3; ++a, step *= 3)
+    {
+      const double* m = &this->indexToData[4 * a];
+      const double x = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
+      region += step * (x < this->planes[2 * a] ? 0 : x < this->planes[2 * a + 1] ? 1 : 2);
+    }
+    return (this->flags >> region & 1) != 0;
+  }
+};
+
+Cuts makeCuts(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, vtkImageData* image)
+{
+  Cuts cuts;
+  vtkMatrix4x4* indexToData = image->GetIndexToPhysicalMatrix();
+  for (int i = 0; i < 12; ++i)
+  {
+    cuts.indexToData[i] = indexToData->GetElement(i / 4, i % 4);
+  }
+  cuts.cropping = mapper->GetCropping() != 0;
+  mapper->GetCroppingRegionPlanes(cuts.planes);
+  cuts.flags = mapper->GetCroppingRegionFlags();
+  if (vtkPlaneCollection* planes = mapper->GetClippingPlanes())
+  {
+    vtkNew<vtkMatrix4x4> indexToWorld;
+    vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), indexToData, indexToWorld);
+    for (int i = 0; i < planes->GetNumberOfItems(); ++i)
+    {
+      const double* n = planes->GetItem(i)->GetNormal();
+      const double* o = planes->GetItem(i)->GetOrigin();
+      std::array<double, 4> h = { { 0., 0., 0., 0. } };
+      for (int column = 0; column < 4; ++column)
+      {
+        for (int row = 0; row < 3; ++row)
+        {
+          h[column] += n[row] * (indexToWorld->GetElement(row, column) - (column == 3 ? o[row] : 0.));
+        }
+      }
+      cuts.halfSpaces.push_back(h);
+    }
+  }
+  return cuts;
+}
+
+//------------------------------------------------------------------------------
+/** sigma_t of every value, averaged over blocks of step^3. */
+template <typename T>
+struct Worker
+{
+  const T* values;
+  const Scalars& scalars;
+  const Classifier& classifier;
+  const Cuts& cuts;
+  int step;
+  int coarse[3];
+  float* sigma_t;
+  double axes[3][3]; // world vector from a value to the next, along each grid axis
+
+  /** |grad S| times the mean spacing, as VTK's gradient opacity has it. */
+  double gradient(int i, int j, int k, int c) const
+  {
+    const int* n = this->scalars.dimensions;
+    const int index[3] = { i, j, k };
+    double sum = 0.;
+    double spacings = 0.;
+    for (int a = 0; a < 3; ++a)
+    {
+      int lower[3] = { i, j, k };
+      int upper[3] = { i, j, k };
+      lower[a] = std::max(index[a] - 1, 0);
+      upper[a] = std::min(index[a] + 1, n[a] - 1);
+      const double length =
+        std::hypot(this->axes[a][0], this->axes[a][1], this->axes[a][2]);
+      const double d =
+        this->at(upper[0], upper[1], upper[2], c) - this->at(lower[0], lower[1], lower[2], c);
+      sum += length > 0. ? .25 * d * d / (length * length) : 0.;
+      spacings += length;
+    }
+    return std::sqrt(sum) * spacings / 3.;
+  }
+
+  double at(int i, int j, int k, int c) const
+  {
+    const int* n = this->scalars.dimensions;
+    const vtkIdType p = (static_cast<vtkIdType>(k) * n[1] + j) * n[0] + i;
+    return static_cast<double>(this->values[p * this->scalars.array->GetNumberOfComponents() + c]);
+  }
+
+  double opacity(int i, int j, int k) const
+  {
+    const Classifier& f = this->classifier;
+    double alpha = 0.;
+    if (!f.independent)
+    {
+      const double value = this->at(i, j, k, f.opacityComponent);
+      if (std::isnan(value))
+      {
+        return 0.;
+      }
+      // Dependent components have their gradient from the first.
+      alpha = f.opacityOf(0, value, f.byGradient[0] ? this->gradient(i, j, k, 0) : 0.);
+    }
+    else
+    {
+      double total = 0.;
+      double squares = 0.;
+      for (int c = 0; c < f.components; ++c)
+      {
+        const double value = this->at(i, j, k, c);
+        const double a = std::isnan(value)
+          ? 0.
+          : f.opacityOf(c, value, f.byGradient[c] ? this->gradient(i, j, k, c) : 0.);
+        total += a * f.weights[c];
+        squares += f.weights[c] > 0. ? a * a : 0.;
+      }
+      alpha = total > 0. ? squares / total : 0.;
+    }
+    if (f.mask)
+    {
+      const int* n = this->scalars.dimensions;
+      const double label =
+        f.mask->GetComponent((static_cast<vtkIdType>(k) * n[1] + j) * n[0] + i, 0);
+      if (!f.labels)
+      {
+        return label > 0. ? alpha : 0.;
+      }
+      const auto own = f.labelOpacity.find(static_cast<int>(label));
+      if (own != f.labelOpacity.end())
+      {
+        alpha += f.blend * (own->second(this->at(i, j, k, 0)) - alpha);
+      }
+    }
+    return alpha;
+  }
+
+  void operator()(vtkIdType begin, vtkIdType end) const
+  {
+    const int* n = this->scalars.dimensions;
+    const double perBlock = 1. / (static_cast<double>(this->step) * this->step * this->step);
+    for (vtkIdType row = begin; row < end; ++row)
+    {
+      const int cj = static_cast<int>(row % this->coarse[1]);
+      const int ck = static_cast<int>(row / this->coarse[1]);
+      for (int ci = 0; ci < this->coarse[0]; ++ci)
+      {
+        double sum = 0.;
+        for (int k = ck * this->step; k < std::min((ck + 1) * this->step, n[2]); ++k)
+        {
+          for (int j = cj * this->step; j < std::min((cj + 1) * this->step, n[1]); ++j)
+          {
+            for (int i = ci * this->step; i < std::min((ci + 1) * this->step, n[0]); ++i)
+            {
+              const double index[3] = { i + this->scalars.first[0], j + this->scalars.first[1],
+                k + this->scalars.first[2] };
+              if (this->cuts.any() && !this->cuts.keeps(index))
+              {
+                continue;
+              }
+              const double alpha = this->opacity(i, j, k);
+              sum += alpha > 0. ? -std::log1p(-std::min(alpha, MostOpaque)) : 0.;
+            }
+          }
+        }
+        // The last block of a row may reach beyond the volume, where there is nothing.
+        this->sigma_t[row * this->coarse[0] + ci] =
+          static_cast<float>(sum * perBlock / this->classifier.unitDistance);
+      }
+    }
+  }
+};
+
+template <typename T>
+void compute(const T* values, const Scalars& scalars, const Classifier& classifier,
+  const Cuts& cuts, int step, const int coarse[3], const double axes[3][3], float* sigma_t)
+{
+  Worker<T> worker{ values, scalars, classifier, cuts, step, { coarse[0], coarse[1], coarse[2] },
+    sigma_t, {} };
+  std::copy(&axes[0][0], &axes[0][0] + 9, &worker.axes[0][0]);
+  vtkSMPTools::For(0, static_cast<vtkIdType>(coarse[1]) * coarse[2], worker);
+}
+} // namespace
+
+//------------------------------------------------------------------------------
+std::vector<double> VolumeExtinctionKey(
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution)
+{
+  std::vector<double> key;
+  const auto object = [&](vtkObject* o)
+  {
+    key.push_back(static_cast<double>(reinterpret_cast<std::uintptr_t>(o)));
+    key.push_back(o ? static_cast<double>(o->GetMTime()) : 0.);
+  };
+  vtkVolumeProperty* property = volume->GetProperty();
+  Scalars scalars;
+  if (!findScalars(mapper, scalars))
+  {
+    return key;
+  }
+  object(scalars.image);
+  object(scalars.array);
+  key.push_back(resolution);
+  key.push_back(property->GetIndependentComponents());
+  key.push_back(property->GetTransferFunctionMode());
+  key.push_back(property->GetScalarOpacityUnitDistance());
+  const int components = std::min(scalars.array->GetNumberOfComponents(), 4);
+  for (int c = 0; c < components; ++c)
+  {
+    key.push_back(property->GetComponentWeight(c));
+    object(property->GetScalarOpacity(c));
+    object(property->HasGradientOpacity(c) ? property->GetGradientOpacity(c) : nullptr);
+    object(property->GetTransferFunction2D(c));
+  }
+  if (vtkImageData* mask = mapper->GetMaskInput())
+  {
+    object(mask);
+    key.push_back(mapper->GetMaskType());
+    key.push_back(mapper->GetMaskBlendFactor());
+    if (vtkDataArray* labels = mask->GetPointData()->GetScalars())
+    {
+      const int highest = static_cast<int>(std::min(labels->GetRange()[1], 1024.));
+      for (int label = 1; label <= highest; ++label)
+      {
+        object(property->GetLabelScalarOpacity(label));
+      }
+    }
+  }
+  const Cuts cuts = makeCuts(mapper, volume, scalars.image);
+  key.push_back(cuts.cropping);
+  if (cuts.cropping)
+  {
+    key.push_back(cuts.flags);
+    key.insert(key.end(), cuts.planes, cuts.planes + 6);
+  }
+  for (const auto& h : cuts.halfSpaces)
+  {
+    key.insert(key.end(), h.begin(), h.end());
+  }
+  return key;
+}
+
+//------------------------------------------------------------------------------
+std::string VolumeExtinction(
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, vtkImageData* result)
+{
+  result->Initialize();
+  Scalars scalars;
+  if (!findScalars(mapper, scalars))
+  {
+    return "The volume has no image with scalars to compute visibility from; it is lit without "
+           "shadows.";
+  }
+  if (!scalars.array->HasStandardMemoryLayout())
+  {
+    vtkNew<vtkFloatArray> copy;
+    copy->DeepCopy(scalars.array);
+    scalars.array = copy;
+  }
+  vtkVolumeProperty* property = volume->GetProperty();
+  if (!(property->GetScalarOpacityUnitDistance() > 0.))
+  {
+    return "ScalarOpacityUnitDistance is " +
+      std::to_string(property->GetScalarOpacityUnitDistance()) +
+      ", expected > 0; the volume is lit without shadows.";
+  }
+  const Classifier classifier = makeClassifier(mapper, property, scalars);
+  const Cuts cuts = makeCuts(mapper, volume, scalars.image);
+
+  const int* n = scalars.dimensions;
+  const int longest = *std::max_element(n, n + 3);
+  const int step = std::max(1, (longest + resolution - 1) / resolution);
+  int coarse[3];
+  double origin[3];
+  double spacing[3];
+  double axes[3][3];
+  vtkMatrix4x4* indexToData = scalars.image->GetIndexToPhysicalMatrix();
+  for (int a = 0; a < 3; ++a)
+  {
+    coarse[a] = (n[a] + step - 1) / step;
+    spacing[a] = scalars.image->GetSpacing()[a] * step;
+    origin[a] = indexToData->GetElement(a, 3);
+    for (int b = 0; b < 3; ++b)
+    {
+      origin[a] += indexToData->GetElement(a, b) * (scalars.first[b] + .5 * (step - 1));
+      axes[b][a] = indexToData->GetElement(a, b);
+    }
+  }
+  vtkNew<vtkFloatArray> sigma_t;
+  sigma_t->SetName("Extinction");
+  const vtkIdType points = static_cast<vtkIdType>(coarse[0]) * coarse[1] * coarse[2];
+  sigma_t->SetNumberOfTuples(points);
+  switch (scalars.array->GetDataType())
+  {
+    vtkTemplateMacro(compute(static_cast<const VTK_TT*>(scalars.array->GetVoidPointer(0)), scalars,
+      classifier, cuts, step, coarse, axes, sigma_t->GetPointer(0)));
+    default:
+      return "The volume's scalars are no numbers; it is lit without shadows.";
+  }
+  result->SetDimensions(coarse);
+  result->SetOrigin(origin);
+  result->SetSpacing(spacing);
+  result->SetDirectionMatrix(scalars.image->GetDirectionMatrix());
+  result->GetPointData()->SetScalars(sigma_t);
+  return std::string();
+}

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/** The extinction of what a volume mapper draws: what shadows are computed from. Private. */
+#ifndef VolumeExtinction_h
+#define VolumeExtinction_h
+
+#include "vtkType.h" // for vtkMTimeType
+
+#include <string>
+#include <vector>
+
+class vtkGPUVolumeRayCastMapper;
+class vtkImageData;
+class vtkVolume;
+
+/** Everything on which VolumeExtinction depends, to be compared: equal, no need to compute. */
+std::vector<double> VolumeExtinctionKey(
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution);
+
+/**
+ * The array "Extinction" (float, 1/length of the data's coordinates) of the volume as the mapper
+ * would composite it: scalar and gradient opacity or 2-D transfer functions, components, masks,
+ * cropping and clipping, sigma_t = -ln(1 - opacity) / unit distance, the opacity at most 0.9999.
+ * On the volume's points, or the means of blocks of them so that at most `resolution` remain along
+ * the longest axis. NaN is transparent. Returns what is wrong with the input, or nothing.
+ */
+std::string VolumeExtinction(
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, vtkImageData* result);
+
+#endif
