@@ -876,6 +876,19 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     this->ProjectEnvironment(renderer, textures > 2 ? 9 : textures > 0 ? 4 : 0);
   }
 
+  // Of the grid that the resolution asks for, whether or not it was computed: all shadow modes
+  // look from the same place.
+  {
+    vtkImageData* image = vtkImageData::SafeDownCast(mapper->GetDataSetInput());
+    int n[3];
+    image->GetDimensions(n);
+    const double* spacing = image->GetSpacing();
+    const int longest = *std::max_element(n, n + 3);
+    const int resolution = property->GetVisibilityResolution();
+    const int step = std::max(1, (longest + resolution - 1) / resolution);
+    this->SurfaceOffset = property->GetSurfaceOffset() * step * scale *
+      std::cbrt(std::abs(spacing[0] * spacing[1] * spacing[2]));
+  }
   const double given = property->GetGradientThreshold();
   for (int c = 0; c < 4; ++c)
   {
@@ -971,6 +984,7 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
 
   set("in_ltLightingStrength", property->GetStrength());
   set("in_ltShadowStrength", property->GetShadowStrength());
+  set("in_ltSurfaceOffset", this->SurfaceOffset);
   set("in_ltAnisotropy", property->GetAnisotropy());
   set("in_ltOcclusionStrength", property->GetAmbientOcclusion());
   if (program->IsUniformUsed("in_ltMaterial"))

@@ -5,6 +5,7 @@
 #define VolumeLighting_h
 
 #include "vtkMatrix4x4.h"
+#include "vtkImageData.h" // for smart pointers
 #include "vtkNew.h"
 #include "vtkSmartPointer.h"
 #include "vtkTextureObject.h"
@@ -14,9 +15,10 @@
 #include <string>
 #include <vector>
 
+class vtkAlgorithm;
 class vtkAlgorithmOutput;
+class vtkDataArray;
 class vtkGPUVolumeRayCastMapper;
-class vtkImageData;
 class vtkLight;
 class vtkOpenGLRenderWindow;
 class vtkRenderer;
@@ -131,6 +133,7 @@ private:
   std::string DefinesOfFrame;
   vtkNew<vtkMatrix4x4> DatasetToVC;
   vtkNew<vtkMatrix4x4> WorldToData;
+  double SurfaceOffset = 0.; // world length
   float Thresholds[4] = { 1.F, 1.F, 1.F, 1.F };
   std::vector<Radiance> Environment;
   vtkTexture* EnvironmentSource = nullptr; // compared, never used

@@ -124,6 +124,12 @@ void vtkVolumeLightingProperty::SetGradientThreshold(double threshold)
 }
 
 //------------------------------------------------------------------------------
+void vtkVolumeLightingProperty::SetSurfaceOffset(double voxels)
+{
+  this->SetClamped(this->SurfaceOffset, voxels, 0., 10., "SurfaceOffset");
+}
+
+//------------------------------------------------------------------------------
 void vtkVolumeLightingProperty::SetAmbientOcclusion(double strength)
 {
   this->SetClamped(this->AmbientOcclusion, strength, 0., 1., "AmbientOcclusion");
@@ -180,6 +186,7 @@ void vtkVolumeLightingProperty::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Metallic: " << this->Metallic << "\n";
   os << indent << "Anisotropy: " << this->Anisotropy << "\n";
   os << indent << "GradientThreshold: " << this->GradientThreshold << "\n";
+  os << indent << "SurfaceOffset: " << this->SurfaceOffset << "\n";
   os << indent << "AmbientOcclusion: " << this->AmbientOcclusion << "\n";
   os << indent << "EnvironmentStrength: " << this->EnvironmentStrength << "\n";
   os << indent << "Deferred: " << (this->Deferred ? "on" : "off") << "\n";

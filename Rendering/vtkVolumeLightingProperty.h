@@ -149,6 +149,17 @@ public:
   ///@}
 
   ///@{
+  /**
+   * How far before a surface, along its normal, visibility is looked up: in voxels of
+   * the visibility's grid, in [0,10] (clamped), default 2. With 0 the first layer of
+   * voxels already shadows the surface that it is, as single scattering in a cloud
+   * has it: opaque surfaces then have half their brightness.
+   */
+  void SetSurfaceOffset(double voxels);
+  vtkGetMacro(SurfaceOffset, double);
+  ///@}
+
+  ///@{
   /** How much the surroundings darken the ambient term, in [0,1] (clamped); default 1. */
   void SetAmbientOcclusion(double strength);
   vtkGetMacro(AmbientOcclusion, double);
@@ -216,6 +227,7 @@ protected:
   double Metallic = 0.;
   double Anisotropy = 0.;
   double GradientThreshold = 0.;
+  double SurfaceOffset = 2.;
   double AmbientOcclusion = 1.;
   double EnvironmentStrength = 0.;
   bool Deferred = false;

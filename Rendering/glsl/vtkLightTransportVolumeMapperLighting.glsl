@@ -96,7 +96,7 @@ float ltOpacityAt(vec3 positionTC)
 // What gets through from a place towards l, as far as `reach`: midpoint rule.
 float ltTransmittance(vec3 positionTC, vec3 l, float reach)
 {
-  vec3 perLengthTC = g_ltStepTC * l;
+  vec3 perLengthTC = g_ltWCToTC * l;
   vec3 toFaces = (step(vec3(0.0), perLengthTC) - positionTC) /
     mix(perLengthTC, vec3(1e-20), equal(perLengthTC, vec3(0.0)));
   float end = min(min(reach, toFaces.x), min(toFaces.y, toFaces.z));
@@ -133,8 +133,12 @@ vec3 ltLit(vec3 color, int component, vec3 positionTC)
   float surface = smoothstep(0.5, 2.0, magnitude / in_ltGradientThreshold[component]);
   n = dot(n, g_ltViewWC) < 0.0 ? -n : n;
 
+  // A surface is not shadowed by itself: what reaches it is looked up a little before it.
+#if LT_LOOKS_UP || LT_SHADOW == 2
+  vec3 beforeTC = positionTC + g_ltWCToTC * (surface * in_ltSurfaceOffset * n);
+#endif
 #if LT_LOOKS_UP
-  vec3 positionVC = (g_ltTCToVC * vec4(positionTC, 1.0)).xyz;
+  vec3 positionVC = (g_ltTCToVC * vec4(beforeTC, 1.0)).xyz;
 #if LT_EXACT > 0 || LT_OCCLUSION == 1
   vec4 exact = textureLod(in_ltExact, positionVC, 0.0);
 #endif
@@ -166,7 +170,7 @@ vec3 ltLit(vec3 color, int component, vec3 positionTC)
     vec3 l = ltTowards(i, positionWC, intensity, reach);
     float v = 1.0;
 #if LT_SHADOW == 2
-    v = ltTransmittance(positionTC, l, reach);
+    v = ltTransmittance(beforeTC, l, reach);
 #elif LT_EXACT > 0 && LT_HARMONICS > 0 && LT_LIGHTS > LT_EXACT
     v = i < LT_EXACT ? exact[min(i, LT_EXACT - 1)] : ltVisibilityOf(i - LT_EXACT, l, texels);
 #elif LT_EXACT > 0

@@ -89,12 +89,11 @@ mat4 g_ltTCToVC;
 uniform mat4 in_ltWorldToData; // directions; in the rotation's place, of length about 1
 mat3 g_ltGradientToWC;         // differences of neighbours -> gradient, per world length
 vec3 g_ltViewWC;               // to the eye; the same all along a ray
-#if LT_POSITIONAL || LT_SHADOW == 2
+#if LT_POSITIONAL
 mat4 g_ltTCToWC;
 #endif
-#if LT_SHADOW == 2
-mat3 g_ltStepTC; // world direction -> a step of the sample distance
-#endif
+uniform float in_ltSurfaceOffset; // world length
+mat3 g_ltWCToTC;                  // of directions
 
 // Affine maps, once per ray. TCToData is TC -> data coordinates.
 void ltInitLighting(mat4 TCToData)
@@ -112,12 +111,10 @@ void ltInitLighting(mat4 TCToData)
 #if LT_LOOKS_UP
   g_ltTCToVC = in_ltDatasetToVC * TCToData;
 #endif
-#if LT_POSITIONAL || LT_SHADOW == 2
+#if LT_POSITIONAL
   g_ltTCToWC = TCToWC;
 #endif
-#if LT_SHADOW == 2
-  g_ltStepTC = inverse(linear);
-#endif
+  g_ltWCToTC = inverse(linear);
 }
 
 // 4 pi times the phase function; theta is between the directions of travel.
