@@ -96,7 +96,9 @@ struct Classifier
   int components = 1;
   bool independent = false;
   int opacityComponent = 0; // of dependent ones
-  double unitDistance = 1.;
+  double unitDistance[4] = { 1., 1., 1., 1. };
+  // VTK does not normalise four dependent components: a stored value of 1 is the range's end.
+  double ofRange = 0.;
   double weights[4] = { 1., 1., 1., 1. };
   double ranges[4][2] = {};
   Table opacity[4];
@@ -127,8 +129,8 @@ struct Classifier
       const double y = steepest > 0. ? gradient / steepest : 0.;
       const auto index = [](double t, int n)
       { return t > 0. ? (t < 1. ? static_cast<int>(t * n) : n - 1) : 0; };
-      return static_cast<const float*>(function->GetScalarPointer(
-        index(x, size[0]), index(y, size[1]), 0))[3];
+      return static_cast<const float*>(
+        function->GetScalarPointer(index(x, size[0]), index(y, size[1]), 0))[3];
     }
     const double a = this->opacity[c](value);
     return this->byGradient[c] ? a * this->gradientOpacity[c](gradient) : a;
@@ -168,10 +170,8 @@ Classifier makeClassifier(
   Classifier classifier;
   classifier.components = std::min(scalars.array->GetNumberOfComponents(), 4);
   classifier.independent = classifier.components > 1 && property->GetIndependentComponents();
-  classifier.unitDistance = property->GetScalarOpacityUnitDistance();
   classifier.opacityComponent = classifier.independent ? 0 : classifier.components - 1;
-  const bool twoDimensional =
-    property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D;
+  const bool twoDimensional = property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D;
   const int functions = classifier.independent ? classifier.components : 1;
   for (int c = 0; c < classifier.components; ++c)
   {
@@ -179,8 +179,11 @@ Classifier makeClassifier(
   }
   for (int f = 0; f < functions; ++f)
   {
-    const double* range = classifier.ranges[classifier.independent ? f : classifier.opacityComponent];
+    const double* range =
+      classifier.ranges[classifier.independent ? f : classifier.opacityComponent];
     classifier.weights[f] = property->GetComponentWeight(f);
+    classifier.unitDistance[f] = property->GetScalarOpacityUnitDistance(
+      classifier.independent ? f : classifier.opacityComponent);
     vtkImageData* function = twoDimensional ? property->GetTransferFunction2D(f) : nullptr;
     if (function && function->GetScalarType() == VTK_FLOAT &&
       function->GetNumberOfScalarComponents() == 4 && function->GetNumberOfPoints() > 0)
@@ -196,6 +199,23 @@ Classifier makeClassifier(
       classifier.byGradient[f] = true;
       classifier.gradientOpacity[f] =
         Table(property->GetGradientOpacity(f), 0., .25 * (range[1] - range[0]));
+    }
+  }
+  if (classifier.components == 4 && !classifier.independent)
+  {
+    switch (scalars.array->GetDataType())
+    {
+      case VTK_UNSIGNED_CHAR:
+      case VTK_SIGNED_CHAR:
+      case VTK_UNSIGNED_SHORT:
+      case VTK_SHORT:
+        classifier.ofRange = 1. / scalars.array->GetDataTypeMax();
+        break;
+      case VTK_FLOAT:
+        classifier.ofRange = 1.;
+        break;
+      default:
+        break;
     }
   }
   prepareMask(mapper, property, scalars, classifier);
@@ -261,7 +281,8 @@ Cuts makeCuts(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, vtkImageData
       {
         for (int row = 0; row < 3; ++row)
         {
-          h[column] += n[row] * (indexToWorld->GetElement(row, column) - (column == 3 ? o[row] : 0.));
+          h[column] +=
+            n[row] * (indexToWorld->GetElement(row, column) - (column == 3 ? o[row] : 0.));
         }
       }
       cuts.halfSpaces.push_back(h);
@@ -297,8 +318,7 @@ struct Worker
       int upper[3] = { i, j, k };
       lower[a] = std::max(index[a] - 1, 0);
       upper[a] = std::min(index[a] + 1, n[a] - 1);
-      const double length =
-        std::hypot(this->axes[a][0], this->axes[a][1], this->axes[a][2]);
+      const double length = std::hypot(this->axes[a][0], this->axes[a][1], this->axes[a][2]);
       const double d =
         this->at(upper[0], upper[1], upper[2], c) - this->at(lower[0], lower[1], lower[2], c);
       sum += length > 0. ? .25 * d * d / (length * length) : 0.;
@@ -314,51 +334,70 @@ struct Worker
     return static_cast<double>(this->values[p * this->scalars.array->GetNumberOfComponents() + c]);
   }
 
-  double opacity(int i, int j, int k) const
+  static double extinction(double alpha, double unitDistance)
+  {
+    return alpha > 0. ? -std::log1p(-std::min(alpha, MostOpaque)) / unitDistance : 0.;
+  }
+
+  /** Opacity of a component's value over its unit distance. */
+  double opacity(int i, int j, int k, int component, int function) const
   {
     const Classifier& f = this->classifier;
-    double alpha = 0.;
-    if (!f.independent)
+    double value = this->at(i, j, k, component);
+    if (std::isnan(value))
     {
-      const double value = this->at(i, j, k, f.opacityComponent);
-      if (std::isnan(value))
-      {
-        return 0.;
-      }
-      // Dependent components have their gradient from the first.
-      alpha = f.opacityOf(0, value, f.byGradient[0] ? this->gradient(i, j, k, 0) : 0.);
+      return 0.;
     }
-    else
+    if (f.ofRange > 0.)
     {
+      const double* range = f.ranges[component];
+      value = range[0] + (range[1] - range[0]) * f.ofRange * value;
+    }
+    // Dependent components have their gradient from the first.
+    return f.opacityOf(function, value,
+      f.byGradient[function] ? this->gradient(i, j, k, f.independent ? component : 0) : 0.);
+  }
+
+  double sigma(int i, int j, int k) const
+  {
+    const Classifier& f = this->classifier;
+    if (f.independent)
+    {
+      // As VTK composites them, over a short distance.
       double total = 0.;
       double squares = 0.;
       for (int c = 0; c < f.components; ++c)
       {
-        const double value = this->at(i, j, k, c);
-        const double a = std::isnan(value)
-          ? 0.
-          : f.opacityOf(c, value, f.byGradient[c] ? this->gradient(i, j, k, c) : 0.);
-        total += a * f.weights[c];
-        squares += f.weights[c] > 0. ? a * a : 0.;
+        const double s = extinction(this->opacity(i, j, k, c, c), f.unitDistance[c]);
+        total += s * f.weights[c];
+        squares += f.weights[c] > 0. ? s * s : 0.;
       }
-      alpha = total > 0. ? squares / total : 0.;
+      const double s = total > 0. ? squares / total : 0.;
+      return this->label(i, j, k) > 0. || f.labels ? s : 0.;
     }
+    double alpha = this->opacity(i, j, k, f.opacityComponent, 0);
     if (f.mask)
     {
-      const int* n = this->scalars.dimensions;
-      const double label =
-        f.mask->GetComponent((static_cast<vtkIdType>(k) * n[1] + j) * n[0] + i, 0);
-      if (!f.labels)
-      {
-        return label > 0. ? alpha : 0.;
-      }
+      const double label = this->label(i, j, k);
       const auto own = f.labelOpacity.find(static_cast<int>(label));
-      if (own != f.labelOpacity.end())
+      if (!f.labels && label <= 0.)
+      {
+        alpha = 0.;
+      }
+      else if (f.labels && own != f.labelOpacity.end())
       {
         alpha += f.blend * (own->second(this->at(i, j, k, 0)) - alpha);
       }
     }
-    return alpha;
+    return extinction(alpha, f.unitDistance[0]);
+  }
+
+  double label(int i, int j, int k) const
+  {
+    const int* n = this->scalars.dimensions;
+    return this->classifier.mask
+      ? this->classifier.mask->GetComponent((static_cast<vtkIdType>(k) * n[1] + j) * n[0] + i, 0)
+      : 1.;
   }
 
   void operator()(vtkIdType begin, vtkIdType end) const
@@ -384,14 +423,12 @@ struct Worker
               {
                 continue;
               }
-              const double alpha = this->opacity(i, j, k);
-              sum += alpha > 0. ? -std::log1p(-std::min(alpha, MostOpaque)) : 0.;
+              sum += this->sigma(i, j, k);
             }
           }
         }
         // The last block of a row may reach beyond the volume, where there is nothing.
-        this->sigma_t[row * this->coarse[0] + ci] =
-          static_cast<float>(sum * perBlock / this->classifier.unitDistance);
+        this->sigma_t[row * this->coarse[0] + ci] = static_cast<float>(sum * perBlock);
       }
     }
   }
@@ -429,11 +466,11 @@ std::vector<double> VolumeExtinctionKey(
   key.push_back(resolution);
   key.push_back(property->GetIndependentComponents());
   key.push_back(property->GetTransferFunctionMode());
-  key.push_back(property->GetScalarOpacityUnitDistance());
   const int components = std::min(scalars.array->GetNumberOfComponents(), 4);
   for (int c = 0; c < components; ++c)
   {
     key.push_back(property->GetComponentWeight(c));
+    key.push_back(property->GetScalarOpacityUnitDistance(c));
     object(property->GetScalarOpacity(c));
     object(property->HasGradientOpacity(c) ? property->GetGradientOpacity(c) : nullptr);
     object(property->GetTransferFunction2D(c));
@@ -484,11 +521,14 @@ std::string VolumeExtinction(
     scalars.array = copy;
   }
   vtkVolumeProperty* property = volume->GetProperty();
-  if (!(property->GetScalarOpacityUnitDistance() > 0.))
+  for (int c = 0; c < std::min(scalars.array->GetNumberOfComponents(), 4); ++c)
   {
-    return "ScalarOpacityUnitDistance is " +
-      std::to_string(property->GetScalarOpacityUnitDistance()) +
-      ", expected > 0; the volume is lit without shadows.";
+    if (!(property->GetScalarOpacityUnitDistance(c) > 0.))
+    {
+      return "ScalarOpacityUnitDistance is " +
+        std::to_string(property->GetScalarOpacityUnitDistance(c)) +
+        ", expected > 0; the volume is lit without shadows.";
+    }
   }
   const Classifier classifier = makeClassifier(mapper, property, scalars);
   const Cuts cuts = makeCuts(mapper, volume, scalars.image);

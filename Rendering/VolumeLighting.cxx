@@ -283,8 +283,8 @@ std::string VolumeLighting::UpdateVisibility(vtkGPUVolumeRayCastMapper* mapper, 
   if (key != this->ExtinctionKey || !this->Filter)
   {
     this->ExtinctionKey = key;
-    this->ExtinctionProblem = VolumeExtinction(
-      mapper, volume, this->Property->GetVisibilityResolution(), this->Extinction);
+    this->ExtinctionProblem =
+      VolumeExtinction(mapper, volume, this->Property->GetVisibilityResolution(), this->Extinction);
     this->Extinction->Modified();
   }
   this->Visibility = nullptr;
@@ -360,8 +360,7 @@ bool VolumeLighting::UploadHarmonics(vtkOpenGLRenderWindow* window)
   ++this->NumberOfUploads;
   std::vector<unsigned char> bytes;
   const int textures = (components + 3) / 4;
-  const auto* floats =
-    array->GetDataType() == VTK_FLOAT && array->HasStandardMemoryLayout()
+  const auto* floats = array->GetDataType() == VTK_FLOAT && array->HasStandardMemoryLayout()
     ? static_cast<const float*>(array->GetVoidPointer(0))
     : nullptr;
   for (int t = 0; t < textures; ++t)
@@ -743,7 +742,7 @@ double VolumeLighting::AutomaticThreshold(
 
 //------------------------------------------------------------------------------
 bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* renderer,
-  vtkVolume* volume, bool hasField, bool skips, std::string& problem)
+  vtkVolume* volume, bool hasField, bool skips, bool partitioned, std::string& problem)
 {
   problem.clear();
   vtkVolumeLightingProperty* property = this->Property;
@@ -768,9 +767,9 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
   int components = 1;
   {
     int cellFlag = 0;
-    if (vtkDataArray* scalars = vtkAbstractMapper::GetScalars(mapper->GetDataSetInput(),
-          mapper->GetScalarMode(), mapper->GetArrayAccessMode(), mapper->GetArrayId(),
-          mapper->GetArrayName(), cellFlag))
+    if (vtkDataArray* scalars =
+          vtkAbstractMapper::GetScalars(mapper->GetDataSetInput(), mapper->GetScalarMode(),
+            mapper->GetArrayAccessMode(), mapper->GetArrayId(), mapper->GetArrayName(), cellFlag))
     {
       components = std::min(scalars->GetNumberOfComponents(), 4);
     }
@@ -786,9 +785,13 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
   {
     shadow = vtkVolumeLightingProperty::NoShadows;
   }
+  if (shadow == vtkVolumeLightingProperty::RayTraced && partitioned)
+  {
+    shadow = vtkVolumeLightingProperty::Precomputed; // a ray sees its own block alone
+  }
   const bool shadows = shadow != vtkVolumeLightingProperty::NoShadows;
-  const bool precomputed = shadow == vtkVolumeLightingProperty::Precomputed &&
-    property->GetShadowStrength() > 0.;
+  const bool precomputed =
+    shadow == vtkVolumeLightingProperty::Precomputed && property->GetShadowStrength() > 0.;
   const bool environment = property->GetEnvironmentStrength() > 0.;
   const bool occlusion = shadows && property->GetAmbientOcclusion() > 0. && ambient > 0.;
   int exactLights = 0;
@@ -818,7 +821,8 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
       if (limit > 0 && *std::max_element(n, n + 3) > limit)
       {
         problem = "The visibility has " + dimensionsAsString(n) + " points, expected at most " +
-          std::to_string(limit) + " along each axis, the limit of this GPU's 3-D textures; the "
+          std::to_string(limit) +
+          " along each axis, the limit of this GPU's 3-D textures; the "
           "volume is lit without shadows.";
       }
       else
@@ -909,8 +913,8 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
       (material->HasGradientOpacity(c) && !material->GetDisableGradientOpacity(c));
   }
   const bool twoDimensional = material->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D;
-  const bool labels = mapper->GetMaskInput() &&
-    mapper->GetMaskType() == vtkGPUVolumeRayCastMapper::LabelMapMaskType;
+  const bool labels =
+    mapper->GetMaskInput() && mapper->GetMaskType() == vtkGPUVolumeRayCastMapper::LabelMapMaskType;
   const bool deferred =
     property->GetDeferred() && blend == vtkVolumeMapper::COMPOSITE_BLEND && !hasField;
   std::ostringstream text;

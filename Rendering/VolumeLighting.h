@@ -4,8 +4,8 @@
 #ifndef VolumeLighting_h
 #define VolumeLighting_h
 
-#include "vtkMatrix4x4.h"
 #include "vtkImageData.h" // for smart pointers
+#include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkSmartPointer.h"
 #include "vtkTextureObject.h"
@@ -43,11 +43,12 @@ public:
   void SetVisibilityConnection(vtkAlgorithmOutput* output);
 
   /**
-   * False if the picture is VTK's own. `skips`: transparent samples may be passed over. A problem
-   * that leaves the volume without shadows is told in `problem`.
+   * False if the picture is VTK's own. `skips`: transparent samples may be passed over;
+   * `partitioned`: the volume is drawn in blocks. A problem that leaves the volume without shadows
+   * is told in `problem`.
    */
   bool Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* renderer, vtkVolume* volume,
-    bool hasField, bool skips, std::string& problem);
+    bool hasField, bool skips, bool partitioned, std::string& problem);
 
   /** The preprocessor's symbols; another text is another shader. */
   const std::string& Defines() const { return this->DefinesOfFrame; }

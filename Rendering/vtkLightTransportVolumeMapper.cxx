@@ -286,7 +286,7 @@ public:
   // 3. the shader
   vtkNew<vtkShaderPass> Pass;
   VolumeLighting Lighting;
-  bool HasField = false;    // this frame's
+  bool HasField = false; // this frame's
   bool HasLighting = false;
   std::string ShaderHead; // the preprocessor's symbols
   std::string FailedTag;
@@ -937,8 +937,10 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
     // Light of the field shows where nothing else does.
     const bool skips =
       !self.HasField || self.Property->GetMode() == vtkLightFieldProperty::Illuminate;
+    const bool partitioned =
+      std::any_of(self.Partitions, self.Partitions + 3, [](int parts) { return parts > 1; });
     self.HasLighting =
-      self.Lighting.Prepare(this, renderer, volume, self.HasField, skips, problem);
+      self.Lighting.Prepare(this, renderer, volume, self.HasField, skips, partitioned, problem);
     if (self.HasLighting && problem != self.LastLightingProblem)
     {
       self.LastLightingProblem = problem;

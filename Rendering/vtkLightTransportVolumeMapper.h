@@ -56,9 +56,30 @@
  * 3-D textures, its producer failed) is one error per cause, and the picture
  * without light.
  *
- * Not for: solving (see vtkLightDiffusionFilter), surfaces, and shadows.
+ * With a vtkVolumeLightingProperty the volume is also lit, with shadows, by the
+ * renderer's lights and environment:
  *
- * @sa vtkLightFieldProperty vtkLightDiffusionFilter vtkLightFieldSlices
+ * @code
+ *   vtkNew<vtkVolumeLightingProperty> lighting;
+ *   mapper->SetLightingProperty(lighting);
+ * @endcode
+ *
+ * Composite blending has all of it; isosurfaces are lit without shadows (their
+ * opacities are no extinction), or with those of a visibility of one's own; in
+ * the other blend modes, and for rectilinear grids, lighting is left out. The
+ * visibility (vtkVisibilityFactorFilter) is computed from what the mapper draws:
+ * opacities by scalar and gradient, 2-D transfer functions, components, masks,
+ * cropping and clipping planes; when one of these changes, when a scene light with
+ * an exact field moves (its own field alone), not for cameras and colours. Lighting
+ * comes first, then the light field over it. Samples without opacity are passed
+ * over before they cost anything, so that a lit frame is often faster than VTK's
+ * shaded one. Lights are where they are with respect to the world: the volume may
+ * move. Picking sees the stock picture.
+ *
+ * Not for: solving (see vtkLightDiffusionFilter) and surfaces.
+ *
+ * @sa vtkLightFieldProperty vtkVolumeLightingProperty vtkLightDiffusionFilter
+ * @sa vtkVisibilityFactorFilter vtkLightFieldSlices
  */
 #ifndef vtkLightTransportVolumeMapper_h
 #define vtkLightTransportVolumeMapper_h
@@ -105,6 +126,7 @@ public:
   ///@{
   /**
    * How the volume is lit, shadows included; nullptr (default): as VTK shades it.
+   * Several mappers may share one.
    * Setting it does not count as a modification of the mapper.
    */
   virtual void SetLightingProperty(vtkVolumeLightingProperty* property);

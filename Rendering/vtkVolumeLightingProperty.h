@@ -87,7 +87,8 @@ public:
    * Where a light's visibility comes from. Precomputed (default): from fields that
    * are computed when the volume or its transfer functions change, for scene lights
    * also when these move. RayTraced: a ray from each sample to each light, the slow
-   * reference; ambient occlusion and environment are then as in Precomputed.
+   * reference (of a volume drawn in partitions: as Precomputed); ambient occlusion and
+   * environment are then as in Precomputed.
    * NoShadows: nothing occludes, neither lights nor environment.
    */
   void SetShadowMode(int mode);

@@ -1,0 +1,137 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * The lighting in every configuration of the superclass: with strength 0 the stock
+ * picture to the pixel; left out where it has no meaning; else a shader that builds,
+ * no error, and precomputed shadows like those that rays in the shader find.
+ */
+#include "VolumeMapperConfigurations.h"
+
+#include "vtkLight.h"
+#include "vtkVolumeLightingProperty.h"
+
+using namespace lighttransport::testing;
+
+namespace
+{
+double psnr(vtkImageData* a, vtkImageData* b)
+{
+  int size[3];
+  a->GetDimensions(size);
+  double squares = 0.;
+  for (int y = 0; y < size[1]; ++y)
+  {
+    for (int x = 0; x < size[0]; ++x)
+    {
+      for (int c = 0; c < 3; ++c)
+      {
+        const double d = pixel(a, x, y)[c] - pixel(b, x, y)[c];
+        squares += d * d;
+      }
+    }
+  }
+  const double mean = squares / (3. * size[0] * size[1]);
+  return mean > 0. ? 10. * std::log10(255. * 255. / mean) : 99.;
+}
+
+/** Two suns; as scene lights they have exact fields. */
+template <typename S>
+void addSuns(S& scene)
+{
+  const Point places[2] = { { -60., 10., 70. }, { 30., -80., 20. } };
+  for (const Point& place : places)
+  {
+    vtkNew<vtkLight> sun;
+    sun->SetLightTypeToSceneLight();
+    sun->SetPosition(place[0], place[1], place[2]);
+    sun->SetFocalPoint(9.5, 9.5, 9.5);
+    sun->SetIntensity(.7);
+    scene.renderer->AddLight(sun);
+  }
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  Suite suite(argc, argv);
+  if (!canRender())
+  {
+    return Suite::skipped();
+  }
+  KeepDisplay keep;
+  for (const Configuration& c : configurations())
+  {
+    // Shade has no say, and other lights are another test's.
+    const std::string name = c.name;
+    if (name.find("shaded") != std::string::npos && name.find("four") == std::string::npos)
+    {
+      continue;
+    }
+    auto image = c.components == 1 ? oneComponent() : components(c.components);
+    StockScene stock(image, 32, 32);
+    LitScene lit(image, 32, 32);
+    auto observer = observe(lit.mapper);
+    stock.mapper->SetBlendMode(c.blend);
+    lit.mapper->SetBlendMode(c.blend);
+    addSuns(stock);
+    addSuns(lit);
+    c.apply(stock.mapper, stock.property, stock.renderer);
+    c.apply(lit.mapper, lit.property, lit.renderer);
+    // Dense, so that there is a shadow.
+    for (int k = 0; k < 4; ++k)
+    {
+      stock.property->SetScalarOpacityUnitDistance(k, .25);
+      lit.property->SetScalarOpacityUnitDistance(k, .25);
+    }
+    vtkNew<vtkVolumeLightingProperty> lighting;
+    lit.mapper->SetLightingProperty(lighting);
+    const auto check = [&](bool ok, const std::string& what)
+    { suite.check(ok, name + ": " + what, __FILE__, __LINE__); };
+
+    const Picture expected = stock.capture();
+    lighting->SetStrength(0.);
+    check(difference(expected, lit.capture()).largest == 0., "strength 0 is the stock picture");
+    lighting->SetStrength(1.);
+    const bool meaningful =
+      c.blend == vtkVolumeMapper::COMPOSITE_BLEND || c.blend == vtkVolumeMapper::ISOSURFACE_BLEND;
+    const Picture shadowed = lit.capture();
+    if (!meaningful)
+    {
+      check(difference(expected, shadowed).largest == 0., "lighting is left out");
+      check(observer->all().empty(), observer->all());
+      continue;
+    }
+    const Color mean = regionMean(shadowed, 8, 8, 23, 23);
+    check(mean[0] > 2., "something is lit: " + std::to_string(mean[0]));
+    lighting->SetShadowModeToNoShadows();
+    const Picture bright = lit.capture();
+    const bool shadows = c.blend == vtkVolumeMapper::COMPOSITE_BLEND;
+    const double darker = regionMean(bright, 8, 8, 23, 23)[0] - mean[0];
+    check(shadows ? darker > .5 : darker == 0., "shadows darken by " + std::to_string(darker));
+    lighting->SetShadowModeToRayTraced();
+    const Picture traced = lit.capture();
+    const double quality = psnr(shadowed, traced);
+    const double without = psnr(bright, traced);
+    std::cout << name << ": " << quality << " dB, without shadows " << without << "\n";
+    check(quality >= 30., "precomputed against traced shadows " + std::to_string(quality) + " dB");
+    check(
+      !shadows || quality > without + 10., "better than no shadows, " + std::to_string(without));
+    if (name == "composite" || name == "isosurface")
+    {
+      lighting->SetShadowModeToPrecomputed();
+      lighting->SetShadingModelToPhysicallyBased();
+      lighting->SetAnisotropy(.5);
+      lighting->SetEnvironmentStrength(.5);
+      lighting->SetStrength(.5);
+      check(difference(shadowed, lit.capture()).largest > 3., "another model");
+      lighting->SetDeferred(true);
+      check(regionMean(lit.capture(), 8, 8, 23, 23)[0] > 2., "first hit");
+      lighting->SetDeferred(false);
+    }
+    lighting->SetStrength(0.);
+    check(difference(expected, lit.capture()).largest == 0., "strength 0 again");
+    check(observer->all().empty(), observer->all());
+    check(openGLErrors().empty(), "OpenGL error");
+  }
+  return suite.result();
+}
