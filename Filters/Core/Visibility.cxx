@@ -258,21 +258,33 @@ void Transpose(const std::array<int, 3>& dims, const float* in, std::int64_t inS
   const std::int64_t nx = dims[0];
   const std::int64_t ny = dims[1];
   const std::int64_t nz = dims[2];
-  constexpr std::int64_t tile = 8; // more, and a power of 2 of rows evict each other
+  constexpr std::int64_t tile = 16;
   ForRows(parallel, ny, nx * ny * nz,
     [&](std::int64_t begin, std::int64_t end)
     {
+      // A tile passes through here, so that each line of memory is visited once: rows a power
+      // of 2 apart evict each other.
+      float block[tile][tile];
       for (std::int64_t j = begin; j < end; ++j)
       {
         for (std::int64_t k0 = 0; k0 < nz; k0 += tile)
         {
+          const std::int64_t k1 = std::min(nz, k0 + tile);
           for (std::int64_t i0 = 0; i0 < nx; i0 += tile)
           {
-            for (std::int64_t i = i0; i < std::min(nx, i0 + tile); ++i)
+            const std::int64_t i1 = std::min(nx, i0 + tile);
+            for (std::int64_t k = k0; k < k1; ++k)
             {
-              for (std::int64_t k = k0; k < std::min(nz, k0 + tile); ++k)
+              for (std::int64_t i = i0; i < i1; ++i)
               {
-                out[outStride * (k + nz * (j + ny * i))] = in[inStride * (i + nx * (j + ny * k))];
+                block[i - i0][k - k0] = in[inStride * (i + nx * (j + ny * k))];
+              }
+            }
+            for (std::int64_t i = i0; i < i1; ++i)
+            {
+              for (std::int64_t k = k0; k < k1; ++k)
+              {
+                out[outStride * (k + nz * (j + ny * i))] = block[i - i0][k - k0];
               }
             }
           }
