@@ -5,6 +5,7 @@
 #include "Core/Kernel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -177,6 +178,74 @@ double update(std::int64_t n, double step, float alpha, const float* LIGHTTRANSP
   return ((rr[0] + rr[4]) + (rr[1] + rr[5])) + ((rr[2] + rr[6]) + (rr[3] + rr[7]));
 }
 
+/** to = scale q - mean, and a[i] - b[i] times previous more, where given */
+template <class T>
+inline void rightHandSide(int n, const T* LIGHTTRANSPORT_RESTRICT q, double scale, double mean,
+  const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b,
+  const double* LIGHTTRANSPORT_RESTRICT previous, double* LIGHTTRANSPORT_RESTRICT to)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    to[i] = q ? scale * static_cast<double>(q[i]) - mean : 0.;
+  }
+  for (int i = 0; previous && i < n; ++i)
+  {
+    to[i] += (static_cast<double>(a[i]) - static_cast<double>(b[i])) * previous[i];
+  }
+}
+
+/** to = (b - y) factor, returns the sum of squares of b - y; to may be null. */
+LIGHTTRANSPORT_SIMD
+double subtract(int n, const double* LIGHTTRANSPORT_RESTRICT b,
+  const double* LIGHTTRANSPORT_RESTRICT y, double factor, float* LIGHTTRANSPORT_RESTRICT to)
+{
+  double sums[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  int i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      const double v = b[i + l] - y[i + l];
+      sums[l] += v * v;
+    }
+  }
+  for (; i < n; ++i)
+  {
+    sums[0] += (b[i] - y[i]) * (b[i] - y[i]);
+  }
+  for (i = 0; to && i < n; ++i)
+  {
+    to[i] = static_cast<float>((b[i] - y[i]) * factor);
+  }
+  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
+/** out = in + tau (b - out), the explicit step; returns the sum of squares of b - out. */
+LIGHTTRANSPORT_SIMD
+double stepRow(int n, const double* LIGHTTRANSPORT_RESTRICT b,
+  const double* LIGHTTRANSPORT_RESTRICT tau, double step, const double* LIGHTTRANSPORT_RESTRICT in,
+  double* LIGHTTRANSPORT_RESTRICT out)
+{
+  double sums[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  int i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      const double v = b[i + l] - out[i + l];
+      sums[l] += v * v;
+      out[i + l] = in[i + l] + (tau ? tau[i + l] : step) * v;
+    }
+  }
+  for (; i < n; ++i)
+  {
+    const double v = b[i] - out[i];
+    sums[0] += v * v;
+    out[i] = in[i] + (tau ? tau[i] : step) * v;
+  }
+  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
 LIGHTTRANSPORT_SIMD
 void combine(std::int64_t n, float beta, const float* LIGHTTRANSPORT_RESTRICT z,
   float* LIGHTTRANSPORT_RESTRICT p)
@@ -199,6 +268,98 @@ void addFaces(int n, double factor, const double* LIGHTTRANSPORT_RESTRICT a,
     const double sum = a[i] + b[i];
     y[i] += factor * (2. * a[i] * (b[i] / (sum > least ? sum : least))) * (x[i] - other[i]);
   }
+}
+
+/** g = factor H(a, b), H the harmonic mean in double */
+template <class T>
+inline void facesOf(int n, double factor, const T* LIGHTTRANSPORT_RESTRICT a,
+  const T* LIGHTTRANSPORT_RESTRICT b, float* LIGHTTRANSPORT_RESTRICT g)
+{
+  constexpr double least = std::numeric_limits<double>::min();
+  for (int i = 0; i < n; ++i)
+  {
+    const double x = static_cast<double>(a[i]);
+    const double y = static_cast<double>(b[i]);
+    const double sum = x + y;
+    g[i] = static_cast<float>(factor * (2. * x * (y / (sum > least ? sum : least))));
+  }
+}
+LIGHTTRANSPORT_SIMD
+void faceRow(int n, double factor, const float* a, const float* b, float* g)
+{
+  facesOf(n, factor, a, b, g);
+}
+LIGHTTRANSPORT_SIMD
+void faceRow(int n, double factor, const double* a, const double* b, float* g)
+{
+  facesOf(n, factor, a, b, g);
+}
+
+/**
+ * The largest of a row; below 0 where one is negative or not finite. By their bits, which are
+ * in the order of the values: comparing a NaN would raise an exception.
+ */
+template <class T, class Bits>
+inline double largestOf(std::int64_t n, const T* LIGHTTRANSPORT_RESTRICT a)
+{
+  const T greatest = std::numeric_limits<T>::max();
+  Bits top;
+  std::memcpy(&top, &greatest, sizeof(T));
+  constexpr Bits minusZero = Bits(1) << (8 * sizeof(T) - 1);
+  Bits most = 0;
+  Bits bad = 0;
+  for (std::int64_t i = 0; i < n; ++i)
+  {
+    Bits bits;
+    std::memcpy(&bits, a + i, sizeof(T));
+    bits = bits == minusZero ? 0 : bits;
+    bad |= bits > top ? 1 : 0;
+    most = bits > most ? bits : most;
+  }
+  T largest;
+  std::memcpy(&largest, &most, sizeof(T));
+  return bad ? -1. : static_cast<double>(largest);
+}
+LIGHTTRANSPORT_SIMD
+double largestRow(std::int64_t n, const float* a)
+{
+  return largestOf<float, std::uint32_t>(n, a);
+}
+LIGHTTRANSPORT_SIMD
+double largestRow(std::int64_t n, const double* a)
+{
+  return largestOf<double, std::uint64_t>(n, a);
+}
+
+/** What the solvers ask of the operator's rows. */
+struct OperatorSummary
+{
+  float diagonal = 0.f, gershgorin = 0.f;
+  bool sink = false, noSink = false, wall = false;
+};
+
+LIGHTTRANSPORT_SIMD
+void summarise(int n, const float* gx, const float* gy, const float* gyS, const float* gz,
+  const float* gzB, const float* s, OperatorSummary& summary)
+{
+  float diagonal = 0.f;
+  float gershgorin = 0.f;
+  float most = 0.f;
+  float least = std::numeric_limits<float>::max();
+  for (int i = 0; i < n; ++i)
+  {
+    const float faces = gx[i] + gx[i - 1] + gy[i] + gyS[i] + gz[i] + gzB[i];
+    const float all = faces + s[i];
+    const float twice = faces + all;
+    diagonal = all > diagonal ? all : diagonal;
+    gershgorin = twice > gershgorin ? twice : gershgorin;
+    most = s[i] > most ? s[i] : most;
+    least = s[i] < least ? s[i] : least;
+  }
+  summary.diagonal = diagonal;
+  summary.gershgorin = gershgorin;
+  summary.sink = most > NoSink;
+  summary.noSink = !(least > NoSink);
 }
 
 template <class T>
@@ -344,6 +505,16 @@ DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
       for (std::int64_t r = begin; r < end; ++r)
       {
         Extremes& e = extremes[static_cast<std::size_t>(r)];
+        if (!outside)
+        {
+          e.D = largestRow(n[0], D + r * n[0]);
+          e.sigma = medium.sigma_a ? largestRow(n[0], medium.sigma_a + r * n[0]) : 0.;
+          if (e.D >= 0. && e.sigma >= 0.)
+          {
+            continue;
+          }
+          e = Extremes(); // find where
+        }
         for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
         {
           if (outside && outside[i])
@@ -428,8 +599,8 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
   // 2. the operator
   this->multigrid.release();
   this->multigridReady = false;
-  this->A.allocate(n);
   const bool whole = spans.empty();
+  this->A.allocate(n, whole ? Pages::Large : Pages::Small);
   if (!whole)
   {
     this->A.restrictTo(std::move(spans));
@@ -450,7 +621,23 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
         const std::int64_t r = this->A.row(t);
         const Span span = this->A.span(r);
         int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-        for (at[0] = span.begin; at[0] < span.end; ++at[0])
+        // a row inside needs no second look but at its ends
+        const bool inside = whole && !outside && n[0] > 1 && at[1] > 0 && at[1] + 1 < n[1] &&
+          at[2] > 0 && at[2] + 1 < n[2];
+        if (inside)
+        {
+          const std::int64_t o = r * n[0];
+          for (int d = 0; d < 3; ++d)
+          {
+            faceRow(d == 0 ? n[0] - 1 : n[0], inverse / (h[d] * h[d]), D + o, D + o + stride[d],
+              this->A.g[d].data() + o);
+          }
+          for (std::int64_t i = o; medium.sigma_a && i < o + n[0]; ++i)
+          {
+            this->A.s[i] = static_cast<float>(static_cast<double>(medium.sigma_a[i]) * inverse);
+          }
+        }
+        for (at[0] = span.begin; at[0] < span.end; at[0] += inside ? n[0] - 1 : 1)
         {
           const std::int64_t i = at[0] + r * n[0];
           const T Di = diffusion(i);
@@ -496,11 +683,7 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
     });
 
   // 3. what the solvers ask of it
-  struct Summary
-  {
-    float diagonal = 0.f, gershgorin = 0.f;
-    bool sink = false, noSink = false, wall = false;
-  };
+  using Summary = OperatorSummary;
   std::vector<Summary> summaries(static_cast<std::size_t>(this->A.numberOfRows()));
   ForRows(this->parallelFor, this->A.numberOfRows(), this->A.activeSize,
     [&](std::int64_t begin, std::int64_t end)
@@ -511,19 +694,34 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
         const Span span = this->A.span(r);
         Summary& summary = summaries[static_cast<std::size_t>(t)];
         const int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-        for (std::int64_t i = r * n[0] + span.begin; i < r * n[0] + span.end; ++i)
+        // voxels outside the domain have no say
+        int first = span.begin;
+        while (first < span.end)
         {
-          if (outside && outside[i])
+          const auto isOut = [&](int x) { return outside && outside[r * n[0] + x]; };
+          int last = outside ? first : span.end;
+          while (last < span.end && !isOut(last))
           {
-            continue;
+            ++last;
           }
-          float faces = this->A.g[0][i] + (i > 0 ? this->A.g[0][i - 1] : 0.f) + this->A.g[1][i] +
-            (at[1] > 0 ? this->A.g[1][i - stride[1]] : 0.f) + this->A.g[2][i] +
-            (at[2] > 0 ? this->A.g[2][i - stride[2]] : 0.f);
-          summary.diagonal = std::max(summary.diagonal, faces + this->A.s[i]);
-          summary.gershgorin = std::max(summary.gershgorin, 2.f * faces + this->A.s[i]);
-          (this->A.s[i] > NoSink ? summary.sink : summary.noSink) = true;
-          summary.wall = summary.wall || !(static_cast<double>(diffusion(i)) > 0.);
+          if (first < last)
+          {
+            const std::int64_t o = r * n[0] + first;
+            Summary part;
+            const float* none = this->A.zeros.data();
+            summarise(last - first, this->A.g[0].data() + o, this->A.g[1].data() + o,
+              at[1] > 0 ? this->A.g[1].data() + o - stride[1] : none, this->A.g[2].data() + o,
+              at[2] > 0 ? this->A.g[2].data() + o - stride[2] : none, this->A.s.data() + o, part);
+            for (std::int64_t i = o; i < o + last - first && !summary.wall; ++i)
+            {
+              summary.wall = !(D[i] > T(0));
+            }
+            summary.diagonal = std::max(summary.diagonal, part.diagonal);
+            summary.gershgorin = std::max(summary.gershgorin, part.gershgorin);
+            summary.sink = summary.sink || part.sink;
+            summary.noSink = summary.noSink || part.noSink;
+          }
+          first = last + 1;
         }
       }
     });
@@ -623,18 +821,23 @@ void DiffusionSolver::prepareMultigrid()
 
 //------------------------------------------------------------------------------
 template <class T>
+void DiffusionSolver::RightHandSide<T>::row(std::int64_t o, int n, double* to) const
+{
+  rightHandSide(n, this->q ? this->q + o : nullptr, this->qScale, this->mean,
+    this->previous ? this->shifted + o : nullptr, this->previous ? this->unshifted + o : nullptr,
+    this->previous ? this->previous + o : nullptr, to);
+}
+
+template <class T>
 double DiffusionSolver::norm(const RightHandSide<T>& b) const
 {
   return std::sqrt(SumEachRow(this->A, this->parallelFor,
     [&](std::int64_t, std::int64_t o, int n)
     {
-      double sum = 0.;
-      for (std::int64_t i = o; i < o + n; ++i)
-      {
-        const double v = b.at(i);
-        sum += v * v;
-      }
-      return sum;
+      static thread_local std::vector<double> store;
+      store.assign(2 * static_cast<std::size_t>(n), 0.);
+      b.row(o, n, store.data());
+      return subtract(n, store.data(), store.data() + n, 1., nullptr);
     }));
 }
 
@@ -716,37 +919,34 @@ void DiffusionSolver::applyExactly(const DiffusionMedium<T>& medium, const doubl
 
 template <class T>
 double DiffusionSolver::residual(
-  const RightHandSide<T>& b, const double* phi, float* out, double rScale) const
+  const RightHandSide<T>& b, const double* phi, float* out, double rScale, bool exactly) const
 {
   const double inverse = 1. / rScale;
   return std::sqrt(SumEachRow(this->A, this->parallelFor,
     [&](std::int64_t row, std::int64_t o, int n)
     {
-      static thread_local std::vector<double> y;
-      y.resize(static_cast<std::size_t>(n));
-      if (!b.ofSteps && this->floatMedium.D)
+      static thread_local std::vector<double> store;
+      store.resize(2 * static_cast<std::size_t>(n));
+      double* right = store.data();
+      double* y = right + n;
+      b.row(o, n, right);
+      if (!phi)
       {
-        this->applyExactly(this->floatMedium, phi, row, o, n, y.data());
+        std::fill(y, y + n, 0.);
       }
-      else if (!b.ofSteps && this->doubleMedium.D)
+      else if (exactly && !b.ofSteps && this->floatMedium.D)
       {
-        this->applyExactly(this->doubleMedium, phi, row, o, n, y.data());
+        this->applyExactly(this->floatMedium, phi, row, o, n, y);
+      }
+      else if (exactly && !b.ofSteps && this->doubleMedium.D)
+      {
+        this->applyExactly(this->doubleMedium, phi, row, o, n, y);
       }
       else
       {
-        applyDouble(doubleRow(this->A, phi, row, o, n), y.data()); // what the steps step with
+        applyDouble(doubleRow(this->A, phi, row, o, n), y); // what the steps step with
       }
-      double sum = 0.;
-      for (int i = 0; i < n; ++i)
-      {
-        const double v = b.at(o + i) - y[static_cast<std::size_t>(i)];
-        sum += v * v;
-        if (out)
-        {
-          out[o + i] = static_cast<float>(v * inverse);
-        }
-      }
-      return sum;
+      return subtract(n, right, y, inverse, out ? out + o : nullptr);
     }));
 }
 
@@ -843,6 +1043,20 @@ void DiffusionSolver::estimateError(
 }
 
 //------------------------------------------------------------------------------
+bool DiffusionSolver::isZero(const double* phi) const
+{
+  std::atomic<bool> zero{ true };
+  ForEachRow(this->A, this->parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
+    {
+      if (zero && std::any_of(phi + o, phi + o + n, [](double v) { return v != 0.; }))
+      {
+        zero = false;
+      }
+    });
+  return zero;
+}
+
 template <class T>
 void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   const DiffusionControl& control, double progressBegin, double progressEnd,
@@ -866,8 +1080,12 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   }
   const double goal = control.tolerance * bNorm;
 
-  double rNorm = this->residual<T>(b, phi, nullptr, 1.);
-  report.fineApplications += 1.;
+  // From darkness the residual is b.
+  const bool dark = this->isZero(phi);
+  Buffer<float> r(size, this->A.pages);
+  double rScale = bNorm; // r holds the residual divided by it
+  double rNorm = this->residual<T>(b, dark ? nullptr : phi, r.data(), rScale);
+  report.fineApplications += dark ? 0. : 1.;
   if (!std::isfinite(rNorm))
   {
     report.reason = StopReason::NotFinite;
@@ -916,21 +1134,20 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
 
   this->prepareMultigrid();
   const DiffusionOperator& op = this->A;
-  Buffer<float> r(size);
-  Buffer<float> z(size);
-  Buffer<float> p(size);
-  Buffer<float> Ap(size);
+  Buffer<float> z(size, this->A.pages);
+  Buffer<float> p(size, this->A.pages);
+  Buffer<float> Ap(size, this->A.pages);
   report.bytes = std::max(report.bytes, this->bytesHeld() + op.activeSize * 24);
 
   const double rStart = rNorm;
-  double rScale = rNorm; // r holds the residual divided by it
-  rNorm = this->residual<T>(b, phi, r.data(), rScale);
   double replaced = rNorm; // the last recomputed norm
   double best = rNorm;
   int stalls = 0;
   double rz = 0.;
   double alpha = 0.;
   bool restart = false;
+  bool fresh = true;
+  std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()), 0.);
   double seen = began;
   const auto finish = [&](StopReason reason)
   {
@@ -957,8 +1174,10 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       finish(StopReason::MaxIterations);
       return;
     }
-    // 1. z = B r
-    this->multigrid.cycle(r.data(), z.data(), loop);
+    // 1. z = B r, and z . r and z . Ap of its rows as they come
+    this->multigrid.cycle(r.data(), z.data(), loop,
+      [&](std::int64_t row, std::int64_t o, int n)
+      { twoDots(n, z.data() + o, r.data() + o, Ap.data() + o, partial.data() + 2 * row); });
     report.fineApplications += 1. + 2. * this->multigrid.sweeps;
     if (cancelled)
     {
@@ -990,21 +1209,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     //    since a cycle in float is not quite linear
     double rzNew = 0.;
     double zAp = 0.;
-    const auto dots = [&]
+    const auto sumUp = [&]
     {
-      std::vector<double> partial(2 * static_cast<std::size_t>(op.numberOfRows()));
-      ForRows(loop, op.numberOfRows(), op.activeSize,
-        [&](std::int64_t begin, std::int64_t end)
-        {
-          for (std::int64_t t = begin; t < end; ++t)
-          {
-            const std::int64_t row = op.row(t);
-            const Span span = op.span(row);
-            const std::int64_t o = row * op.dims[0] + span.begin;
-            twoDots(span.end - span.begin, z.data() + o, r.data() + o, Ap.data() + o,
-              partial.data() + 2 * t);
-          }
-        });
       rzNew = zAp = 0.;
       for (std::size_t i = 0; i < partial.size(); i += 2)
       {
@@ -1012,19 +1218,17 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         zAp += partial[i + 1];
       }
     };
-    dots();
-    if (cancelled)
-    {
-      cancel();
-      return;
-    }
+    sumUp();
     if (std::isfinite(rzNew) && !(rzNew > 0.))
     {
       // The coarse operators are not Galerkin's: where one is far too weak, the correction
       // overshoots. A step along r / diagonal always gains.
       divideByDiagonal(op, r.data(), z.data(), loop);
       restart = true;
-      dots();
+      ForEachRow(op, loop,
+        [&](std::int64_t row, std::int64_t o, int n)
+        { twoDots(n, z.data() + o, r.data() + o, Ap.data() + o, partial.data() + 2 * row); });
+      sumUp();
     }
     if (!std::isfinite(rzNew) || !(rzNew > 0.))
     {
@@ -1035,11 +1239,21 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     const double beta = restart || iteration == 0 ? 0. : -alpha * zAp / rz;
     restart = false;
     rz = rzNew;
-    ForEachRow(op, loop,
-      [&](std::int64_t, std::int64_t o, int n)
-      { combine(n, static_cast<float>(beta), z.data() + o, p.data() + o); });
-    // 4. alpha = r . z / p . A p
-    const double pAp = Apply(op, p.data(), Ap.data(), loop);
+    // 4. alpha = r . z / p . A p, with A p = A z + beta A p_old but where the residual was
+    //    recomputed: there A p is as well
+    double pAp = 0.;
+    if (fresh)
+    {
+      ForEachRow(op, loop,
+        [&](std::int64_t, std::int64_t o, int n)
+        { combine(n, static_cast<float>(beta), z.data() + o, p.data() + o); });
+      pAp = Apply(op, p.data(), Ap.data(), loop);
+    }
+    else
+    {
+      pAp = Advance(op, z.data(), static_cast<float>(beta), p.data(), Ap.data(), loop);
+    }
+    fresh = false;
     report.fineApplications += 1.;
     if (cancelled)
     {
@@ -1074,10 +1288,11 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     {
       const double recurred = rNorm;
       rScale = std::max(recurred, 1e-12 * replaced); // a claim of exactly 0 is none
-      rNorm = this->residual<T>(b, phi, r.data(), rScale);
+      rNorm = this->residual<T>(b, phi, r.data(), rScale, claims || rNorm < 1e-5 * bNorm);
       report.fineApplications += 1.;
       report.residual = rNorm / bNorm;
-      if (rNorm <= goal)
+      fresh = true;
+      if (claims && rNorm <= goal)
       {
         report.reason = StopReason::Converged;
         return;
@@ -1684,24 +1899,19 @@ DiffusionReport DiffusionSolver::march(
     const double rNorm = std::sqrt(SumRows(this->parallelFor, this->rows(), size,
       [&](std::int64_t r)
       {
-        double* LIGHTTRANSPORT_RESTRICT out = to + r * nx;
-        const double* in = from + r * nx;
+        double* out = to + r * nx;
         const DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
         applyDouble(row, out);
-        static thread_local std::vector<double> tau;
-        tau.assign(static_cast<std::size_t>(nx), step);
+        static thread_local std::vector<double> store;
+        store.resize(2 * static_cast<std::size_t>(nx));
+        double* right = store.data();
+        double* tau = local ? right + nx : nullptr;
+        b.row(r * nx, nx, right);
         if (local)
         {
-          localSteps(row, step, tau.data());
+          localSteps(row, step, tau);
         }
-        double sum = 0.;
-        for (int x = 0; x < nx; ++x)
-        {
-          const double v = b.at(r * nx + x) - out[x];
-          out[x] = in[x] + tau[static_cast<std::size_t>(x)] * v;
-          sum += v * v;
-        }
-        return sum;
+        return stepRow(nx, right, tau, step, from + r * nx, out);
       }));
     std::swap(from, to);
     ++report.iterations;

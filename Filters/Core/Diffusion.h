@@ -232,26 +232,25 @@ private:
     const float* shifted = nullptr;
     const float* unshifted = nullptr;
 
-    double at(std::int64_t i) const
-    {
-      return (this->q ? this->qScale * static_cast<double>(this->q[i]) - this->mean : 0.) +
-        (this->previous
-            ? (static_cast<double>(this->shifted[i]) - static_cast<double>(this->unshifted[i])) *
-              this->previous[i]
-            : 0.);
-    }
+    /** b of n voxels from o on. */
+    void row(std::int64_t o, int n, double* to) const;
   };
   template <class T>
   void conjugateGradients(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
     double progressBegin, double progressEnd, DiffusionReport& report);
-  /** |b - A phi|, and the residual divided by rScale in r where that is asked for. */
+  /**
+   * |b - A phi|, and the residual divided by rScale in r where that is asked for; from the
+   * medium itself in double, or (not exactly) from the float faces that the solver works with.
+   */
   template <class T>
-  double residual(const RightHandSide<T>& b, const double* phi, float* r, double rScale) const;
+  double residual(const RightHandSide<T>& b, const double* phi, float* r, double rScale,
+    bool exactly = true) const;
   template <class T>
   void applyExactly(const DiffusionMedium<T>& medium, const double* phi, std::int64_t row,
     std::int64_t o, int n, double* y) const;
   template <class T>
   double norm(const RightHandSide<T>& b) const;
+  bool isZero(const double* phi) const;
   template <class T>
   void balance(const T* q, const double* phi, DiffusionReport& report) const;
   /** Of stepExplicit (c dt = step) and, where `local`, of stepLocal (step = courant). */

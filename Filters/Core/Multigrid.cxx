@@ -13,6 +13,10 @@ namespace
 {
 using Weights = MultigridWeights;
 
+/** A tile of rows has so many values per plane, and so many planes: see skew(). */
+constexpr std::int64_t TileValues = 65536;
+constexpr int TilePlanes = 16;
+
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
 {
@@ -46,12 +50,14 @@ RowFaces facesOfRow(const DiffusionOperator& A, std::int64_t row, std::int64_t b
     A.g[2].data() + begin, k > 0 ? A.g[2].data() + begin - nx * ny : zeros, A.s.data() + begin };
 }
 
-/** x = (b + sum g x_j) / (sum g + s) on the voxels i of the row with (i + parity) even. */
+/**
+ * x = (b + sum g x_j) / (sum g + s) on the voxels i of the row with (i + parity) even. All are
+ * computed, into tmp, which keeps the loops straight; and a loop in place would read values
+ * that are still on their way to the cache.
+ */
 LIGHTTRANSPORT_SIMD
-void relaxRow(int n, int parity, const RowFaces& f, const float* LIGHTTRANSPORT_RESTRICT xS,
-  const float* LIGHTTRANSPORT_RESTRICT xN, const float* LIGHTTRANSPORT_RESTRICT xB,
-  const float* LIGHTTRANSPORT_RESTRICT xT, const float* LIGHTTRANSPORT_RESTRICT b,
-  float* LIGHTTRANSPORT_RESTRICT tmp, float* x)
+void relaxRow(int n, int parity, const RowFaces& f, const RowView& v,
+  const float* LIGHTTRANSPORT_RESTRICT b, float* LIGHTTRANSPORT_RESTRICT tmp, float* x)
 {
   const float* LIGHTTRANSPORT_RESTRICT gx = f.gx;
   const float* LIGHTTRANSPORT_RESTRICT gy = f.gy;
@@ -59,6 +65,10 @@ void relaxRow(int n, int parity, const RowFaces& f, const float* LIGHTTRANSPORT_
   const float* LIGHTTRANSPORT_RESTRICT gz = f.gz;
   const float* LIGHTTRANSPORT_RESTRICT gzB = f.gzB;
   const float* LIGHTTRANSPORT_RESTRICT s = f.s;
+  const float* LIGHTTRANSPORT_RESTRICT xS = v.xS;
+  const float* LIGHTTRANSPORT_RESTRICT xN = v.xN;
+  const float* LIGHTTRANSPORT_RESTRICT xB = v.xB;
+  const float* LIGHTTRANSPORT_RESTRICT xT = v.xT;
   const float* xc = x;
   for (int i = 0; i < n; ++i)
   {
@@ -152,6 +162,107 @@ double applyRow(int n, const RowFaces& f, const RowView& v, float* LIGHTTRANSPOR
     dot[0] += static_cast<double>(x[i]) * static_cast<double>(y[i]);
   }
   return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
+}
+
+LIGHTTRANSPORT_SIMD
+double dotRow(int n, const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b)
+{
+  double dot[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  int i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      dot[l] += static_cast<double>(a[i + l]) * static_cast<double>(b[i + l]);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    dot[0] += static_cast<double>(a[i]) * static_cast<double>(b[i]);
+  }
+  return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
+}
+
+/** p = z + beta p, y = A z + beta y; returns p . y */
+LIGHTTRANSPORT_SIMD
+double advanceRow(int n, const RowFaces& f, const RowView& v, float beta,
+  float* LIGHTTRANSPORT_RESTRICT p, float* LIGHTTRANSPORT_RESTRICT y)
+{
+  const float* LIGHTTRANSPORT_RESTRICT gx = f.gx;
+  const float* LIGHTTRANSPORT_RESTRICT gy = f.gy;
+  const float* LIGHTTRANSPORT_RESTRICT gyS = f.gyS;
+  const float* LIGHTTRANSPORT_RESTRICT gz = f.gz;
+  const float* LIGHTTRANSPORT_RESTRICT gzB = f.gzB;
+  const float* LIGHTTRANSPORT_RESTRICT s = f.s;
+  const float* z = v.x;
+  const float* zS = v.xS;
+  const float* zN = v.xN;
+  const float* zB = v.xB;
+  const float* zT = v.xT;
+  for (int i = 0; i < n; ++i)
+  {
+    const float c = z[i];
+    p[i] = c + beta * p[i];
+    y[i] = gx[i] * (c - z[i + 1]) + gx[i - 1] * (c - z[i - 1]) + gy[i] * (c - zN[i]) +
+      gyS[i] * (c - zS[i]) + gz[i] * (c - zT[i]) + gzB[i] * (c - zB[i]) + s[i] * c + beta * y[i];
+  }
+  return dotRow(n, p, y);
+}
+
+LIGHTTRANSPORT_SIMD
+double sumRow(int n, const float* LIGHTTRANSPORT_RESTRICT a)
+{
+  double sums[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  int i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      sums[l] += static_cast<double>(a[i + l]);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    sums[0] += static_cast<double>(a[i]);
+  }
+  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
+/** b -= t v */
+LIGHTTRANSPORT_SIMD
+void subtractRow(
+  int n, float t, const float* LIGHTTRANSPORT_RESTRICT v, float* LIGHTTRANSPORT_RESTRICT b)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    b[i] -= t * v[i];
+  }
+}
+
+/** y = c1 x + c2 y */
+LIGHTTRANSPORT_SIMD
+void mixRow(int n, float c1, const float* LIGHTTRANSPORT_RESTRICT x, float c2,
+  float* LIGHTTRANSPORT_RESTRICT y)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    y[i] = c1 * x[i] + c2 * y[i];
+  }
+}
+
+LIGHTTRANSPORT_SIMD
+void closeRow(int n, const RowFaces& f, float isolated, float* LIGHTTRANSPORT_RESTRICT s)
+{
+  const float* gx = f.gx;
+  const float* gy = f.gy;
+  const float* gyS = f.gyS;
+  const float* gz = f.gz;
+  const float* gzB = f.gzB;
+  for (int i = 0; i < n; ++i)
+  {
+    const float den = gx[i] + gx[i - 1] + gy[i] + gyS[i] + gz[i] + gzB[i] + s[i];
+    s[i] = den > 1e-30f ? s[i] : isolated;
+  }
 }
 
 /** Resistance of half a face; a closed one is as good as infinite. */
@@ -275,37 +386,164 @@ void gatherFacesRow(int n, const float* LIGHTTRANSPORT_RESTRICT between,
   }
 }
 
-/** x += kept times the tensor product of the three weights on eight coarse values. */
+/**
+ * The faces after odd voxels of a row, which alone lie between coarse ones, and their inner
+ * faces: masked, masked + room and masked + 2 room. x is the first voxel's coordinate of n.
+ */
 LIGHTTRANSPORT_SIMD
-void prolongRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx,
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz,
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept, const float* const* up,
-  const float* const* side, float* LIGHTTRANSPORT_RESTRICT x)
+void maskFacesRow(int count, int x, int n, float noResistance, const float* g, std::size_t room,
+  float* LIGHTTRANSPORT_RESTRICT masked)
 {
-  const float* LIGHTTRANSPORT_RESTRICT u0 = up[0];
-  const float* LIGHTTRANSPORT_RESTRICT u1 = up[1];
-  const float* LIGHTTRANSPORT_RESTRICT u2 = up[2];
-  const float* LIGHTTRANSPORT_RESTRICT u3 = up[3];
-  const float* LIGHTTRANSPORT_RESTRICT s0 = side[0];
-  const float* LIGHTTRANSPORT_RESTRICT s1 = side[1];
-  const float* LIGHTTRANSPORT_RESTRICT s2 = side[2];
-  const float* LIGHTTRANSPORT_RESTRICT s3 = side[3];
-  constexpr float unit = 1.f / 255.f;
-  for (int i = 0; i < n; ++i)
+  float* LIGHTTRANSPORT_RESTRICT below = masked + room;
+  float* LIGHTTRANSPORT_RESTRICT above = masked + 2 * room;
+  for (int i = 0; i < count; ++i)
   {
-    const float a = unit * static_cast<float>(wx[i]);
-    const float b = unit * static_cast<float>(wy[i]);
-    const float c = unit * static_cast<float>(wz[i]);
-    const float v0 = u0[i] + a * (s0[i] - u0[i]);
-    const float v1 = u1[i] + a * (s1[i] - u1[i]);
-    const float v2 = u2[i] + a * (s2[i] - u2[i]);
-    const float v3 = u3[i] + a * (s3[i] - u3[i]);
-    const float y0 = v0 + b * (v1 - v0);
-    const float y1 = v2 + b * (v3 - v2);
-    x[i] += unit * static_cast<float>(kept[i]) * (y0 + c * (y1 - y0));
+    const float face = static_cast<float>(x + i + 1 < n ? (x + i) & 1 : 0);
+    masked[i] = face * g[i];
+    below[i] = face * g[i - 1];
+    above[i] = face * g[i + 1];
+  }
+  const int last = n - 2 - x; // its voxel above is its own centre
+  if (last >= 0 && last < count && (n & 1) == 1)
+  {
+    above[last] = noResistance;
   }
 }
 
+/** The coarse faces [begin, end) from the sums over the lines: own and next, see gatherFacesRow. */
+LIGHTTRANSPORT_SIMD
+void seriesRow(int begin, int end, bool halved, const float* own, const float* next,
+  std::size_t room, float* LIGHTTRANSPORT_RESTRICT out)
+{
+  const float* own1 = own + room;
+  const float* own2 = own + 2 * room;
+  const float* next1 = next + room;
+  const float* next2 = next + 2 * room;
+  const auto sum = [halved](const float* p, const float* q, int i)
+  { return halved ? p[2 * i] + p[2 * i + 1] + q[2 * i - 1] + q[2 * i + 2] : p[i]; };
+  for (int i = begin; i < end; ++i)
+  {
+    const float between = sum(own, next, i);
+    const float below = sum(own1, next1, i);
+    const float above = sum(own2, next2, i);
+    const bool open = between > 1e-25f && below > 1e-25f && above > 1e-25f;
+    const float resistance = open ? 0.5f / below + 1.f / between + 0.5f / above : 1.f;
+    out[i] = open ? 1.f / resistance : 0.f;
+  }
+}
+
+/**
+ * What the voxels 2 I + odd with first <= I < last of a residual give to four coarse rows:
+ * own[m] goes to I, next[m] to I's neighbour along x.
+ */
+LIGHTTRANSPORT_SIMD
+void depositRow(int first, int last, const MultigridLine& v, const float* r, float* const* own,
+  float* const* next)
+{
+  constexpr float unit = 1.f / 255.f;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx = v.wx + v.odd;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy = v.wy + v.odd;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz = v.wz + v.odd;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept = v.kept + v.odd;
+  const float* LIGHTTRANSPORT_RESTRICT value = r + v.odd;
+  float* LIGHTTRANSPORT_RESTRICT o0 = own[0];
+  float* LIGHTTRANSPORT_RESTRICT o1 = own[1];
+  float* LIGHTTRANSPORT_RESTRICT o2 = own[2];
+  float* LIGHTTRANSPORT_RESTRICT o3 = own[3];
+  float* LIGHTTRANSPORT_RESTRICT n0 = next[0];
+  float* LIGHTTRANSPORT_RESTRICT n1 = next[1];
+  float* LIGHTTRANSPORT_RESTRICT n2 = next[2];
+  float* LIGHTTRANSPORT_RESTRICT n3 = next[3];
+  for (int I = first; I < last; ++I)
+  {
+    const float t = value[2 * I] * unit * static_cast<float>(kept[2 * I]);
+    const float u = t * unit * static_cast<float>(wx[2 * I]);
+    const float b = unit * static_cast<float>(wy[2 * I]);
+    const float c = unit * static_cast<float>(wz[2 * I]);
+    const float f3 = b * c;
+    const float f2 = c - f3;
+    const float f1 = b - f3;
+    const float f0 = 1.f - c - f1;
+    o0[I] = (t - u) * f0;
+    n0[I] = u * f0;
+    o1[I] = (t - u) * f1;
+    n1[I] = u * f1;
+    o2[I] = (t - u) * f2;
+    n2[I] = u * f2;
+    o3[I] = (t - u) * f3;
+    n3[I] = u * f3;
+  }
+}
+
+LIGHTTRANSPORT_SIMD
+void addTwo(int n, const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b,
+  float* LIGHTTRANSPORT_RESTRICT to)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    to[i] += a[i] + b[i];
+  }
+}
+
+/** x[2 I + odd] += kept times the tensor product of the three weights on eight coarse values. */
+LIGHTTRANSPORT_SIMD
+void prolongRow(int first, int last, const MultigridLine& v, const float* const* coarse, float* sum)
+{
+  constexpr float unit = 1.f / 255.f;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx = v.wx + v.odd;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy = v.wy + v.odd;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz = v.wz + v.odd;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept = v.kept + v.odd;
+  const int side = v.odd ? 1 : -1;
+  const float* u0 = coarse[0];
+  const float* u1 = coarse[1];
+  const float* u2 = coarse[2];
+  const float* u3 = coarse[3];
+  const float* s0 = u0 + side;
+  const float* s1 = u1 + side;
+  const float* s2 = u2 + side;
+  const float* s3 = u3 + side;
+  float* LIGHTTRANSPORT_RESTRICT to = sum;
+  for (int I = first; I < last; ++I)
+  {
+    const float a = unit * static_cast<float>(wx[2 * I]);
+    const float b = unit * static_cast<float>(wy[2 * I]);
+    const float c = unit * static_cast<float>(wz[2 * I]);
+    const float v0 = u0[I] + a * (s0[I] - u0[I]);
+    const float v1 = u1[I] + a * (s1[I] - u1[I]);
+    const float v2 = u2[I] + a * (s2[I] - u2[I]);
+    const float v3 = u3[I] + a * (s3[I] - u3[I]);
+    const float y0 = v0 + b * (v1 - v0);
+    const float y1 = v2 + b * (v3 - v2);
+    to[I] = unit * static_cast<float>(kept[2 * I]) * (y0 + c * (y1 - y0));
+  }
+}
+
+/** x[2 I + odd] += v[I] */
+LIGHTTRANSPORT_SIMD
+void spreadRow(int first, int last, int odd, const float* LIGHTTRANSPORT_RESTRICT v,
+  float* LIGHTTRANSPORT_RESTRICT x)
+{
+  const float even = odd ? 0.f : 1.f;
+  const float other = odd ? 1.f : 0.f;
+  for (int I = first; I < last; ++I)
+  {
+    x[2 * I] += even * v[I];
+    x[2 * I + 1] += other * v[I];
+  }
+}
+
+/** Room for the rows of a kernel, per thread, with a line of zeros on either side. */
+float* scratch(std::size_t rows, std::size_t length, std::size_t& pitch)
+{
+  static thread_local std::vector<float> store;
+  pitch = (length + 47) / 16 * 16;
+  if (store.size() < rows * pitch + 16)
+  {
+    store.resize(rows * pitch + 16);
+  }
+  return store.data() + 16;
+}
 /** (i + j + k + colour) & 1 of the first value of a row's span. */
 int parityOf(const DiffusionOperator& A, std::int64_t row, std::int64_t begin, int colour)
 {
@@ -314,45 +552,80 @@ int parityOf(const DiffusionOperator& A, std::int64_t row, std::int64_t begin, i
 }
 
 /**
- * One half-sweep over the voxels with (i + j + k + colour) even. relaxRow reads
- * and rewrites a row's other colour as well, which keeps its loop straight; and it
- * reads the value before the row and the one after it. So no two rows that are
- * neighbours, in space or in memory, may be in two threads at a time. Slabs, a few
- * rows thick along the longer of y and z, see to it: first all even ones in
- * parallel, then the odd ones. Their number is even: along y the last slab's rows
- * are followed, in memory, by the first slab's.
+ * body(stage, row) for each row of the domain and each stage, as if the stages came one after
+ * the other, while the rows in between stay in the cache. A stage may read the row itself and
+ * its four neighbours, and of these only what the next stage leaves alone (the other colour).
+ *
+ * Tiles of rows; within one, a wave runs along z, each stage a plane behind the one before. From
+ * stage to stage an even tile gives up a row at either end, which the odd tile beside it takes
+ * over when all even ones are done: no row is done twice, and no two tiles that run at a time
+ * have rows that are neighbours, in space or in memory (that is why their number along y is 1 or
+ * even). The tiles depend on the grid alone.
  */
-void relax(
-  const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
+void skew(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor,
+  const std::function<void(int stage, std::int64_t row)>& body)
 {
-  constexpr int thickness = 4;
   const int ny = A.dims[1];
   const int nz = A.dims[2];
-  const bool alongZ = nz >= ny;
-  const std::int64_t length = alongZ ? nz : ny;
-  const std::int64_t pairs = std::max<std::int64_t>(1, length / (2 * thickness));
-  for (int odd = 0; odd < 2; ++odd)
+  int tiles[2] = { 1, 1 }; // along y and z
+  const int least = 2 * stages + 4;
+  if (A.size() >= ParallelGrain)
   {
-    ForRows(parallelFor, pairs, A.activeSize,
+    const int height = std::max<int>(least, static_cast<int>(TileValues / A.dims[0]));
+    if (ny >= 2 * height || nz < 2 * least)
+    {
+      tiles[0] = std::max(1, ny / std::min(height, ny / 2) / 2 * 2);
+    }
+    tiles[1] = std::max(1, nz / std::max(least, TilePlanes));
+  }
+  for (int phase = 0; phase < 4; ++phase)
+  {
+    const int odd[2] = { phase & 1, phase >> 1 };
+    const int along[2] = { (tiles[0] + 1 - odd[0]) / 2, (tiles[1] + 1 - odd[1]) / 2 };
+    const int count = along[0] * along[1];
+    if (count == 0)
+    {
+      continue;
+    }
+    ForRows(parallelFor, count, A.activeSize,
       [&](std::int64_t begin, std::int64_t end)
       {
-        std::vector<float> tmp(static_cast<std::size_t>(A.dims[0]));
-        for (std::int64_t pair = begin; pair < end; ++pair)
+        for (std::int64_t t = begin; t < end; ++t)
         {
-          const int from = static_cast<int>(length * (2 * pair + odd) / (2 * pairs));
-          const int to = static_cast<int>(length * (2 * pair + odd + 1) / (2 * pairs));
-          for (int k = alongZ ? from : 0; k < (alongZ ? to : nz); ++k)
+          const int tile[2] = { 2 * static_cast<int>(t % along[0]) + odd[0],
+            2 * static_cast<int>(t / along[0]) + odd[1] };
+          const int n[2] = { ny, nz };
+          const auto range = [&](int d, int stage, int& from, int& to)
           {
-            for (int j = alongZ ? 0 : from; j < (alongZ ? ny : to); ++j)
+            const int grow = odd[d] ? stage : -stage;
+            from = static_cast<int>(static_cast<std::int64_t>(n[d]) * tile[d] / tiles[d]);
+            to = static_cast<int>(static_cast<std::int64_t>(n[d]) * (tile[d] + 1) / tiles[d]);
+            from = tile[d] == 0 ? 0 : from - grow;
+            to = tile[d] + 1 == tiles[d] ? n[d] : to + grow;
+          };
+          int first = 0;
+          int last = 0;
+          range(1, odd[1] ? stages - 1 : 0, first, last);
+          for (int front = first; front < last + stages - 1; ++front)
+          {
+            for (int stage = 0; stage < stages; ++stage)
             {
-              const std::int64_t row = j + static_cast<std::int64_t>(ny) * k;
-              const Span span = A.span(row);
-              if (span.begin < span.end)
+              const int k = front - stage;
+              int from[2], to[2];
+              range(1, stage, from[1], to[1]);
+              if (k < from[1] || k >= to[1])
               {
-                const std::int64_t o = row * A.dims[0] + span.begin;
-                const RowView v = viewRow(A, x, row, o);
-                relaxRow(span.end - span.begin, parityOf(A, row, o, colour), facesOfRow(A, row, o),
-                  v.xS, v.xN, v.xB, v.xT, b + o, tmp.data(), x + o);
+                continue;
+              }
+              range(0, stage, from[0], to[0]);
+              for (int j = from[0]; j < to[0]; ++j)
+              {
+                const std::int64_t row = j + static_cast<std::int64_t>(ny) * k;
+                const Span span = A.span(row);
+                if (span.begin < span.end)
+                {
+                  body(stage, row);
+                }
               }
             }
           }
@@ -360,25 +633,18 @@ void relax(
       });
   }
 }
-
-void start(
-  const DiffusionOperator& A, int colour, const float* b, float* x, const ParallelFor& parallelFor)
-{
-  ForEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int n)
-    { startRow(n, parityOf(A, row, o, colour), facesOfRow(A, row, o), b + o, x + o); });
-}
 } // namespace
 
 //------------------------------------------------------------------------------
-void DiffusionOperator::allocate(const std::array<int, 3>& n)
+void DiffusionOperator::allocate(const std::array<int, 3>& n, Pages size)
 {
+  this->pages = size;
   this->dims = n;
   for (auto& faces : this->g)
   {
-    faces.allocate(this->size());
+    faces.allocate(this->size(), this->pages);
   }
-  this->s.allocate(this->size());
+  this->s.allocate(this->size(), this->pages);
   this->zeros.allocate(n[0]);
   this->activeRows.clear();
   this->spans.clear();
@@ -439,10 +705,20 @@ double Apply(const DiffusionOperator& A, const float* x, float* y, const Paralle
     { return applyRow(n, facesOfRow(A, row, o), viewRow(A, x, row, o), y + o); });
 }
 
+double Advance(const DiffusionOperator& A, const float* z, float beta, float* p, float* y,
+  const ParallelFor& parallelFor)
+{
+  return SumEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    { return advanceRow(n, facesOfRow(A, row, o), viewRow(A, z, row, o), beta, p + o, y + o); });
+}
+
 //------------------------------------------------------------------------------
 void Multigrid::release()
 {
   this->levels.clear();
+  this->first.release();
+  this->firstImage.release();
   this->finest = nullptr;
 }
 
@@ -453,10 +729,11 @@ std::int64_t Multigrid::bytes() const
   {
     // what the domain touches of each: the rest of the memory stays with the system
     const DiffusionOperator& A = &level == &this->levels.front() ? *this->finest : level.A;
-    const std::int64_t perVoxel = (level.x.empty() ? 0 : 8) + (level.r.empty() ? 0 : 5) +
+    const std::int64_t perVoxel = (level.x.empty() ? 0 : 8) + (level.kept.empty() ? 0 : 1) +
       static_cast<std::int64_t>(!level.w[0].empty()) + !level.w[1].empty() + !level.w[2].empty();
     sum += level.A.bytes() + A.activeSize * perVoxel;
   }
+  sum += this->levels.size() > 2 ? 8 * this->levels[1].A.activeSize : 0;
   return sum;
 }
 
@@ -479,15 +756,7 @@ void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor
       {
         const float* g = fine->g[d].data();
         mean[d] = SumEachRow(*fine, parallelFor,
-                    [&](std::int64_t, std::int64_t o, int n)
-                    {
-                      double sum = 0.;
-                      for (std::int64_t i = o; i < o + n; ++i)
-                      {
-                        sum += static_cast<double>(g[i]);
-                      }
-                      return sum;
-                    }) *
+                    [&](std::int64_t, std::int64_t o, int n) { return sumRow(n, g + o); }) *
           fine->dims[d] / (fine->dims[d] - 1.);
         largest = std::max(largest, mean[d]);
       }
@@ -507,6 +776,11 @@ void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor
     this->coarsen(*fine, this->levels[this->levels.size() - 2], coarse, parallelFor);
     fine = &coarse.A;
   }
+  if (this->levels.size() > 2)
+  {
+    this->first.allocate(this->levels[1].A.size(), A.pages);
+    this->firstImage.allocate(this->levels[1].A.size(), A.pages);
+  }
 }
 
 //------------------------------------------------------------------------------
@@ -520,15 +794,14 @@ void Multigrid::coarsen(
     nc[d] = fine.halved[d] ? (n[d] + 1) / 2 : n[d];
     if (fine.halved[d])
     {
-      fine.w[d].allocate(A.size());
+      fine.w[d].allocate(A.size(), A.pages);
     }
   }
   fine.noWeight.allocate(n[0]);
-  fine.kept.allocate(A.size());
-  fine.r.allocate(A.size());
-  coarse.A.allocate(nc);
-  coarse.x.allocate(coarse.A.size());
-  coarse.b.allocate(coarse.A.size());
+  fine.kept.allocate(A.size(), A.pages);
+  coarse.A.allocate(nc, A.pages);
+  coarse.x.allocate(coarse.A.size(), A.pages);
+  coarse.b.allocate(coarse.A.size(), A.pages);
   if (!A.spans.empty())
   {
     std::vector<Span> spans(static_cast<std::size_t>(nc[1]) * nc[2], Span{ nc[0], 0 });
@@ -591,6 +864,7 @@ void Multigrid::coarsen(
       gather(A, fine, coarse.A, A.g[d].data(), nullptr, d, coarse.A.g[d].data(), parallelFor);
     }
   }
+  Buffer<float> felt(A.size(), A.pages);
   // A sink pulls its own voxel down, and the parents only as far as the voxel is tied to them:
   // the balance of flux there has the sink beside the lines.
   ForEachRow(A, parallelFor,
@@ -632,15 +906,20 @@ void Multigrid::coarsen(
         {
           tieRow(i, i + 1, 2, whole - 1, i + 1 < n[0] ? whole : nullptr, nullptr, all);
         }
-        for (int i = begin + (begin & 1); i < begin + length; i += 2)
+        if (begin == 0)
         {
-          tieRow(i, i + 1, 2, i == lone ? nullptr : whole, i > 0 ? whole - 1 : nullptr,
-            i > 1 ? whole - 2 : nullptr, all);
+          tieRow(0, 1, 2, lone == 0 ? nullptr : whole, nullptr, nullptr, all);
+        }
+        const int first = std::max(begin + (begin & 1), 2);
+        tieRow(first, std::min(begin + length, lone), 2, whole, whole - 1, whole - 2, all);
+        if (lone >= first && lone < begin + length)
+        {
+          tieRow(lone, lone + 1, 2, nullptr, whole - 1, whole - 2, all);
         }
       }
-      keepRow(length, tie, A.s.data() + o, fine.kept.data() + o, fine.r.data() + o);
+      keepRow(length, tie, A.s.data() + o, fine.kept.data() + o, felt.data() + o);
     });
-  gather(A, fine, coarse.A, fine.r.data(), nullptr, -1, coarse.A.s.data(), parallelFor);
+  gather(A, fine, coarse.A, felt.data(), nullptr, -1, coarse.A.s.data(), parallelFor);
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
 }
@@ -760,15 +1039,7 @@ void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
           const int count = span.end - span.begin;
           if (along == 0)
           {
-            // only the faces after odd voxels lie between coarse ones
-            for (int i = 0; i < count; ++i)
-            {
-              const int x = span.begin + i;
-              const float face = (x & 1) && x + 1 < n[0] ? 1.f : 0.f;
-              masked[i] = face * g[i];
-              masked[i + room] = face * g[i - 1];
-              masked[i + 2 * room] = x + 2 < n[0] ? face * g[i + 1] : face * noResistance;
-            }
+            maskFacesRow(count, span.begin, n[0], noResistance, g, room, masked);
             between = masked;
             below = masked + room;
             above = masked + 2 * room;
@@ -785,156 +1056,313 @@ void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
       // the lines of a coarse face mix between the faces: sums in series (an upper bound, which
       // keeps bent corridors open; straight lines in parallel would be a lower one)
       const int begin = static_cast<int>(o - row * nc[0]);
-      for (int i = begin; i < begin + length; ++i)
-      {
-        float sum[3];
-        for (int s = 0; s < 3; ++s)
-        {
-          const float* p = own + static_cast<std::size_t>(s) * room;
-          const float* q = next + static_cast<std::size_t>(s) * room;
-          sum[s] = fine.halved[0] ? p[2 * i] + p[2 * i + 1] + q[2 * i - 1] + q[2 * i + 2] : p[i];
-        }
-        const bool open = sum[0] > 1e-25f && sum[1] > 1e-25f && sum[2] > 1e-25f;
-        out[row * nc[0] + i] = open ? 1.f / (0.5f / sum[1] + 1.f / sum[0] + 0.5f / sum[2]) : 0.f;
-      }
+      seriesRow(begin, begin + length, fine.halved[0], own, next, room, out + row * nc[0]);
     });
 }
 
-void Multigrid::prolong(const DiffusionOperator& A, const Level& fine, const Level& coarse,
-  float* x, const ParallelFor& parallelFor) const
+MultigridLine Multigrid::lineOf(const Level& fine, const int at[3], std::int64_t begin) const
 {
-  const std::array<int, 3>& n = A.dims;
-  const std::array<int, 3>& nc = coarse.A.dims;
-  ForEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int length)
-    {
-      static thread_local std::vector<float> store;
-      const std::size_t room = static_cast<std::size_t>(n[0]) + 2;
-      store.resize(8 * room);
-      const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-      const int begin = static_cast<int>(o - row * n[0]);
-      // the parent's coordinate, and its neighbour's on this voxel's side
-      int J[3][2];
-      const std::uint8_t* w[3];
-      for (int d = 0; d < 3; ++d)
-      {
-        const int parent = fine.halved[d] ? at[d] / 2 : at[d];
-        const int neighbour = parent + (at[d] % 2 ? 1 : -1);
-        const bool inside = fine.halved[d] && neighbour >= 0 && neighbour < nc[d];
-        J[d][0] = parent;
-        J[d][1] = inside ? neighbour : parent;
-        w[d] = fine.halved[d] ? fine.w[d].data() + o : fine.noWeight.data();
-      }
-      const float* up[4];
-      const float* side[4];
-      for (int c = 0; c < 4; ++c)
-      {
-        const float* xc =
-          coarse.x.data() + nc[0] * (J[1][c & 1] + static_cast<std::int64_t>(nc[1]) * J[2][c >> 1]);
-        float* u = store.data() + 2 * static_cast<std::size_t>(c) * room;
-        float* s = u + room;
-        if (fine.halved[0])
-        {
-          for (int i = begin / 2; i <= (begin + length - 1) / 2; ++i)
-          {
-            u[2 * i] = u[2 * i + 1] = xc[i];
-            s[2 * i] = xc[i - 1];
-            s[2 * i + 1] = xc[i + 1];
-          }
-        }
-        else
-        {
-          std::copy(xc + begin, xc + begin + length, u + begin);
-          std::copy(xc + begin, xc + begin + length, s + begin);
-        }
-        up[c] = u + begin;
-        side[c] = s + begin;
-      }
-      prolongRow(length, w[0], w[1], w[2], fine.kept.data() + o, up, side, x + o);
-    });
+  const std::uint8_t* w[3];
+  for (int d = 0; d < 3; ++d)
+  {
+    w[d] = fine.halved[d] ? fine.w[d].data() + begin : fine.noWeight.data();
+  }
+  return { w[0], w[1], w[2], fine.kept.data() + begin, fine.halved[0], (at[1] + at[2]) & 1 };
 }
-
 void CloseIsolated(DiffusionOperator& A, float isolated, const ParallelFor& parallelFor)
 {
   ForEachRow(A, parallelFor,
     [&](std::int64_t row, std::int64_t o, int n)
     {
       const RowFaces f = facesOfRow(A, row, o);
-      float* s = A.s.data() + o;
-      for (int i = 0; i < n; ++i)
-      {
-        const float den = f.gx[i] + f.gx[i - 1] + f.gy[i] + f.gyS[i] + f.gz[i] + f.gzB[i] + s[i];
-        if (!(den > 1e-30f))
-        {
-          s[i] = isolated;
-        }
-      }
+      closeRow(n, f, isolated, A.s.data() + o);
     });
 }
 
 //------------------------------------------------------------------------------
-void Multigrid::cycle(const float* b, float* x, const ParallelFor& parallelFor)
+namespace
 {
-  this->cycle(0, b, x, true, parallelFor);
+/** The coarse rows that a fine row lies between: own, along y, along z, along both. */
+struct Between
+{
+  std::int64_t row[4];
+  bool inside[4];
+};
+
+Between between(const std::array<int, 3>& nc, const std::array<bool, 3>& halved, const int at[3])
+{
+  int J[3][2];
+  bool next[3];
+  for (int d = 1; d < 3; ++d)
+  {
+    J[d][0] = halved[d] ? at[d] / 2 : at[d];
+    J[d][1] = J[d][0] + (at[d] % 2 ? 1 : -1);
+    next[d] = halved[d] && J[d][1] >= 0 && J[d][1] < nc[d];
+    J[d][1] = next[d] ? J[d][1] : J[d][0];
+  }
+  Between rows;
+  for (int m = 0; m < 4; ++m)
+  {
+    rows.row[m] = J[1][m & 1] + static_cast<std::int64_t>(nc[1]) * J[2][m >> 1];
+    rows.inside[m] = (!(m & 1) || next[1]) && (!(m >> 1) || next[2]);
+  }
+  return rows;
+}
+
+} // namespace
+
+void Multigrid::restrictRow(const DiffusionOperator& A, const Level& fine, Level& coarse,
+  std::int64_t row, const float* b, const float* x) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const DiffusionOperator& C = coarse.A;
+  const Span span = A.span(row);
+  const std::int64_t begin = row * n[0];
+  const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+  std::size_t pitch = 0;
+  float* r = scratch(9, static_cast<std::size_t>(n[0]), pitch);
+  residualRow(span.end - span.begin, facesOfRow(A, row, begin + span.begin),
+    viewRow(A, x, row, begin + span.begin), b + begin + span.begin, r + span.begin);
+  const MultigridLine line = this->lineOf(fine, at, begin);
+  const Between rows = between(C.dims, fine.halved, at);
+  float* bc = coarse.b.data();
+  if (!line.halved)
+  {
+    // no coarser along x: nothing is put between there
+    constexpr float unit = 1.f / 255.f;
+    for (int m = 0; m < 4; ++m)
+    {
+      if (!rows.inside[m])
+      {
+        continue;
+      }
+      float* to = bc + rows.row[m] * C.dims[0];
+      for (int i = span.begin + ((span.begin + line.odd) & 1); i < span.end; i += 2)
+      {
+        const float wy = unit * static_cast<float>(line.wy[i]);
+        const float wz = unit * static_cast<float>(line.wz[i]);
+        to[i] += r[i] * unit * static_cast<float>(line.kept[i]) * ((m & 1) ? wy : 1.f - wy) *
+          ((m >> 1) ? wz : 1.f - wz);
+      }
+    }
+    return;
+  }
+  // the red voxels 2 I + odd of the span
+  const int first = (span.begin - line.odd + 1) / 2;
+  const int last = (span.end - line.odd + 1) / 2;
+  float *own[4], *next[4];
+  const int side = line.odd ? 1 : -1;
+  for (int m = 0; m < 4; ++m)
+  {
+    own[m] = r + static_cast<std::size_t>(1 + m) * pitch;
+    next[m] = r + static_cast<std::size_t>(5 + m) * pitch;
+  }
+  if (first >= last)
+  {
+    return;
+  }
+  depositRow(first, last, line, r, own, next);
+  const int from = std::max(first - 1, 0);
+  const int to = std::min(last + 1, C.dims[0]);
+  for (int m = 0; m < 4; ++m)
+  {
+    // what is read beyond [first, last) was not written
+    own[m][first - 1] = own[m][last] = 0.f;
+    next[m][first - 1] = next[m][first - 2] = next[m][last] = next[m][last + 1] = 0.f;
+    const Span target = C.span(rows.row[m]);
+    const int f = std::max(from, target.begin);
+    const int t = std::min(to, target.end);
+    if (rows.inside[m] && f < t)
+    {
+      addTwo(t - f, own[m] + f, next[m] + f - side, bc + rows.row[m] * C.dims[0] + f);
+    }
+  }
+}
+
+void Multigrid::prolongRow(const DiffusionOperator& A, const Level& fine, const Level& coarse,
+  std::int64_t row, float* x) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const DiffusionOperator& C = coarse.A;
+  const Span span = A.span(row);
+  const std::int64_t begin = row * n[0];
+  const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+  const MultigridLine line = this->lineOf(fine, at, begin);
+  const Between rows = between(C.dims, fine.halved, at);
+  const float* e[4];
+  for (int m = 0; m < 4; ++m)
+  {
+    e[m] = coarse.x.data() + rows.row[m] * C.dims[0];
+  }
+  float* to = x + begin;
+  if (!line.halved)
+  {
+    constexpr float unit = 1.f / 255.f;
+    for (int i = span.begin + ((span.begin + line.odd) & 1); i < span.end; i += 2)
+    {
+      const float b = unit * static_cast<float>(line.wy[i]);
+      const float c = unit * static_cast<float>(line.wz[i]);
+      const float y0 = e[0][i] + b * (e[1][i] - e[0][i]);
+      const float y1 = e[2][i] + b * (e[3][i] - e[2][i]);
+      to[i] += unit * static_cast<float>(line.kept[i]) * (y0 + c * (y1 - y0));
+    }
+    return;
+  }
+  const int first = (span.begin - line.odd + 1) / 2;
+  const int last = (span.end - line.odd + 1) / 2;
+  std::size_t pitch = 0;
+  float* sum = scratch(1, static_cast<std::size_t>(n[0]), pitch);
+  ::lighttransport::prolongRow(first, last, line, e, sum);
+  // pairs (2 I, 2 I + 1), but for a last voxel without a partner
+  const int pairs = 2 * (last - 1) + 1 < span.end ? last : last - 1;
+  const int whole = 2 * first >= span.begin ? first : first + 1;
+  if (whole > first)
+  {
+    to[2 * first + line.odd] += sum[first];
+  }
+  spreadRow(whole, std::max(pairs, whole), line.odd, sum, to);
+  if (last > std::max(pairs, whole))
+  {
+    to[2 * (last - 1) + line.odd] += sum[last - 1];
+  }
+}
+
+//------------------------------------------------------------------------------
+void Multigrid::cycle(const float* b, float* x, const ParallelFor& parallelFor, const RowBody& done)
+{
+  this->cycle(0, b, x, parallelFor, done);
 }
 
 void Multigrid::cycle(
-  std::size_t l, const float* b, float* x, bool fromZero, const ParallelFor& parallelFor)
+  std::size_t l, const float* b, float* x, const ParallelFor& parallelFor, const RowBody& done)
 {
   const DiffusionOperator& A = this->operatorOf(l);
   Level& fine = this->levels[l];
-  // 4. smooth: red then black
-  for (int sweep = 0; sweep < this->sweeps; ++sweep)
+  Level* coarse = l + 1 < this->levels.size() ? &this->levels[l + 1] : nullptr;
+  const auto relax = [&](std::int64_t row, int colour)
   {
-    if (sweep == 0 && fromZero)
+    const Span span = A.span(row);
+    const std::int64_t o = row * A.dims[0] + span.begin;
+    std::size_t pitch = 0;
+    relaxRow(span.end - span.begin, parityOf(A, row, o, colour), facesOfRow(A, row, o),
+      viewRow(A, x, row, o), b + o, scratch(1, static_cast<std::size_t>(A.dims[0]), pitch), x + o);
+  };
+  const int half = 2 * this->sweeps;
+  // 4. smooth: red then black; 3. restrict what is left
+  if (coarse)
+  {
+    ForEachRow(coarse->A, parallelFor,
+      [&](std::int64_t, std::int64_t o, int n)
+      { std::fill(coarse->b.data() + o, coarse->b.data() + o + n, 0.f); });
+  }
+  skew(A, coarse ? half + 1 : half, parallelFor,
+    [&](int stage, std::int64_t row)
     {
-      start(A, 0, b, x, parallelFor);
-    }
-    else
+      if (stage == 0)
+      {
+        const Span span = A.span(row);
+        const std::int64_t o = row * A.dims[0] + span.begin;
+        startRow(
+          span.end - span.begin, parityOf(A, row, o, 0), facesOfRow(A, row, o), b + o, x + o);
+      }
+      else if (stage < half)
+      {
+        relax(row, stage & 1);
+      }
+      else
+      {
+        this->restrictRow(A, fine, *coarse, row, b, x);
+      }
+    });
+  if (coarse)
+  {
+    this->solveCoarse(l + 1, parallelFor);
+  }
+  // 3. correct; 4. smooth: black then red
+  const int shift = coarse ? 1 : 0;
+  const int stages = half + shift;
+  skew(A, stages, parallelFor,
+    [&](int stage, std::int64_t row)
     {
-      relax(A, 0, b, x, parallelFor);
-    }
-    relax(A, 1, b, x, parallelFor);
-  }
-  if (l + 1 < this->levels.size())
-  {
-    Level& coarse = this->levels[l + 1];
-    float* r = fine.r.data();
-    ForEachRow(A, parallelFor,
-      [&](std::int64_t row, std::int64_t o, int n)
-      { residualRow(n, facesOfRow(A, row, o), viewRow(A, x, row, o), b + o, r + o); });
-    this->gather(A, fine, coarse.A, r, fine.kept.data(), -1, coarse.b.data(), parallelFor);
-    this->cycle(l + 1, coarse.b.data(), coarse.x.data(), true, parallelFor);
-    this->prolong(A, fine, coarse, x, parallelFor);
-  }
-  // 4. smooth: black then red
-  for (int sweep = 0; sweep < this->sweeps; ++sweep)
-  {
-    relax(A, 1, b, x, parallelFor);
-    relax(A, 0, b, x, parallelFor);
-  }
+      if (stage < shift)
+      {
+        this->prolongRow(A, fine, *coarse, row, x);
+        return;
+      }
+      relax(row, (stage - shift + 1) & 1);
+      if (stage + 1 == stages && done)
+      {
+        const Span span = A.span(row);
+        done(row, row * A.dims[0] + span.begin, span.end - span.begin);
+      }
+    });
 }
 
-void Multigrid::fullCycle(const float* b, float* x, const ParallelFor& parallelFor)
+void Multigrid::solveCoarse(std::size_t l, const ParallelFor& parallelFor)
 {
-  const std::size_t last = this->levels.size() - 1;
-  const auto rhs = [&](std::size_t l) { return l == 0 ? b : this->levels[l].b.data(); };
-  const auto field = [&](std::size_t l) { return l == 0 ? x : this->levels[l].x.data(); };
-  for (std::size_t l = 0; l < last; ++l)
+  Level& level = this->levels[l];
+  const DiffusionOperator& C = level.A;
+  float* b = level.b.data();
+  float* x = level.x.data();
+  if (l > 1 || l + 1 >= this->levels.size())
   {
-    this->gather(this->operatorOf(l), this->levels[l], this->levels[l + 1].A, rhs(l),
-      this->levels[l].kept.data(), -1, this->levels[l + 1].b.data(), parallelFor);
+    this->cycle(l, b, x, parallelFor, nullptr);
+    return;
   }
-  this->cycle(last, rhs(last), field(last), true, parallelFor);
-  for (std::size_t l = last; l-- > 0;)
+  // 5. two steps of conjugate gradients: c1 x1 + c2 x2 is the best there in A's norm
+  float* x1 = this->first.data();
+  float* v1 = this->firstImage.data();
+  double xb = 0.;
+  this->cycle(l, b, x1, parallelFor, nullptr);
+  double a11 = 0.;
   {
-    const DiffusionOperator& A = this->operatorOf(l);
-    // The coarser cycles below use the coarser right-hand sides: this one's is still in place,
-    // since a cycle on level l + 1 writes those of l + 2 and beyond.
-    ForEachRow(A, parallelFor,
-      [&](std::int64_t, std::int64_t o, int n) { std::fill(field(l) + o, field(l) + o + n, 0.f); });
-    this->prolong(A, this->levels[l], this->levels[l + 1], field(l), parallelFor);
-    this->cycle(l, rhs(l), field(l), false, parallelFor);
+    xb = SumEachRow(C, parallelFor,
+      [&](std::int64_t, std::int64_t o, int n) { return dotRow(n, x1 + o, b + o); });
+    a11 = Apply(C, x1, v1, parallelFor);
   }
+  const double t = a11 > 0. ? xb / a11 : 0.;
+  if (!(t > 0.) || !std::isfinite(t))
+  {
+    std::swap(this->first, level.x);
+    return;
+  }
+  ForEachRow(C, parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
+    { subtractRow(n, static_cast<float>(t), v1 + o, b + o); });
+  this->cycle(l, b, x, parallelFor, nullptr);
+  double a22 = 0.;
+  double a12 = 0.;
+  double x2b = 0.;
+  std::vector<double> partial(3 * static_cast<std::size_t>(C.numberOfRows()));
+  ForRows(parallelFor, C.numberOfRows(), C.activeSize,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t i = begin; i < end; ++i)
+      {
+        const std::int64_t row = C.row(i);
+        const Span span = C.span(row);
+        const int n = span.end - span.begin;
+        const std::int64_t o = row * C.dims[0] + span.begin;
+        std::size_t pitch = 0;
+        float* v2 = scratch(1, static_cast<std::size_t>(n), pitch);
+        double* sums = partial.data() + 3 * i;
+        sums[0] = applyRow(n, facesOfRow(C, row, o), viewRow(C, x, row, o), v2);
+        sums[1] = dotRow(n, x + o, v1 + o);
+        sums[2] = dotRow(n, x + o, b + o);
+      }
+    });
+  for (std::size_t i = 0; i < partial.size(); i += 3)
+  {
+    a22 += partial[i];
+    a12 += partial[i + 1];
+    x2b += partial[i + 2];
+  }
+  const double rho = a22 - a12 * a12 / a11;
+  const bool second = rho > 1e-6 * a22 && std::isfinite(x2b / rho);
+  const double c2 = second ? x2b / rho : 0.;
+  const double c1 = t - c2 * a12 / a11;
+  ForEachRow(C, parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
+    { mixRow(n, static_cast<float>(c1), x1 + o, static_cast<float>(c2), x + o); });
 }
 } // namespace lighttransport

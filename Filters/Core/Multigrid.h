@@ -24,8 +24,18 @@
  *      parent's neighbour by the balance of flux along the line that joins them, and
  *      lowers it by what its own sink takes; a coarse sink is what is felt of the
  *      sinks through those lines. The restriction is the transpose.
- *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after
- *      the coarse correction, so that the cycle is symmetric and positive definite.
+ *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after the
+ *      coarse correction, twice each. After a red-black sweep only red voxels have a
+ *      residual, and only they need a correction.
+ *   5. The second grid takes two steps of conjugate gradients around its own cycle (Notay
+ *      and Vassilevski 2008, a K-cycle), so that what a coarse operator over- or
+ *      underestimates is scaled right. The cycle is then not quite linear: whoever uses
+ *      it as a preconditioner takes a flexible method.
+ *
+ * All steps before the coarse correction are one pass over the memory, all steps after it
+ * another: rows of a tile go through the steps in a skewed wave, each step a plane behind
+ * the one before (Wolf and Lam 1991; see skew in the source). That is what makes two
+ * sweeps cost hardly more than one.
  *
  * Alcouffe, Brandt, Dendy and Painter 1981 (SIAM J. Sci. Stat. Comput. 2, 430)
  * introduced conductance-weighted transfers for strongly varying coefficients.
@@ -67,6 +77,7 @@ struct DiffusionOperator
   std::vector<std::int64_t> activeRows;
   std::vector<Span> spans;
   std::int64_t activeSize = 0; ///< values within the spans
+  Pages pages = Pages::Large;  ///< Small where the domain is a part of the box
 
   std::int64_t size() const
   {
@@ -86,7 +97,7 @@ struct DiffusionOperator
     return this->spans.empty() ? Span{ 0, this->dims[0] }
                                : this->spans[static_cast<std::size_t>(row)];
   }
-  void allocate(const std::array<int, 3>& n);
+  void allocate(const std::array<int, 3>& n, Pages size = Pages::Large);
   /** Restricts the domain to the spans; before the coefficients are written. */
   void restrictTo(std::vector<Span> rowSpans);
   std::int64_t bytes() const;
@@ -105,11 +116,24 @@ void CloseIsolated(DiffusionOperator& A, float s, const ParallelFor& parallelFor
 /** y = A x and returns x . y; in float, with the sum in double. */
 double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor);
 
+/** p = z + beta p and y = A z + beta y, which is A p as long as y was; returns p . y. */
+double Advance(const DiffusionOperator& A, const float* z, float beta, float* p, float* y,
+  const ParallelFor& parallelFor);
+
 /** (factor + slope (here + there)) is the weight of a voxel, or of a face, for a coarse row. */
 struct MultigridWeights
 {
   const std::uint8_t *here, *there;
   float factor, slope;
+};
+
+/** A row's weights along the lines. */
+struct MultigridLine
+{
+  const std::uint8_t *wx, *wy, *wz, *kept;
+  /** Along x: is it halved? Then voxel x = 2 I + odd lies between I and I + (odd ? 1 : -1). */
+  bool halved;
+  int odd; ///< the red voxels of the row are those with x + odd even
 };
 
 class Multigrid
@@ -120,19 +144,14 @@ public:
   void release();
 
   /**
-   * One V-cycle from zero: x ~ A^-1 b. Both have a value per voxel of A, with
-   * one readable value before and after (Buffer has that).
+   * One cycle from zero: x ~ A^-1 b. Both have a value per voxel of A, with one readable value
+   * before and after (Buffer has that). `done`, where given, is called for each row as soon as
+   * x is final there, while the row is in the cache.
    */
-  void cycle(const float* b, float* x, const ParallelFor& parallelFor);
+  void cycle(const float* b, float* x, const ParallelFor& parallelFor, const RowBody& done = {});
 
-  /**
-   * Full multigrid: a better first guess than a cycle's, at the price of about one.
-   * From the coarsest grid up, each grid's cycle starts at the coarser one's answer.
-   */
-  void fullCycle(const float* b, float* x, const ParallelFor& parallelFor);
-
-  /** Smoothing sweeps before and after each coarse correction; default 1. */
-  int sweeps = 1;
+  /** Smoothing sweeps before and after each coarse correction; default 2. */
+  int sweeps = 2;
 
   std::int64_t bytes() const;
   int numberOfLevels() const { return static_cast<int>(this->levels.size()) + 1; }
@@ -142,16 +161,16 @@ private:
   {
     DiffusionOperator A; // empty on the finest, which is the caller's
     Buffer<float> x, b;  // empty on the finest: the caller's
-    Buffer<float> r;     // residual, where there is a coarser level
     std::array<bool, 3> halved{ { false, false, false } };
     std::array<Buffer<std::uint8_t>, 3> w; // weight of the parent's neighbour, /255
     Buffer<std::uint8_t>
       kept; // of what comes in along the lines, the part that no sink takes, /255
     Buffer<std::uint8_t> noWeight; // a row of 0, along axes that are not halved
   };
-  /** A cycle on level l; x is the start where `fromZero` is false. */
   void cycle(
-    std::size_t l, const float* b, float* x, bool fromZero, const ParallelFor& parallelFor);
+    std::size_t l, const float* b, float* x, const ParallelFor& parallelFor, const RowBody& done);
+  /** levels[l].x ~ A^-1 levels[l].b, which is spoilt. */
+  void solveCoarse(std::size_t l, const ParallelFor& parallelFor);
   const DiffusionOperator& operatorOf(std::size_t l) const
   {
     return l == 0 ? *this->finest : this->levels[l].A;
@@ -179,12 +198,17 @@ private:
   /** The coarse faces along an axis that is halved, see 2. above. */
   void gatherFaces(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
     int along, float* out, const ParallelFor& parallelFor) const;
-  /** x += P coarse.x */
-  void prolong(const DiffusionOperator& A, const Level& fine, const Level& coarse, float* x,
-    const ParallelFor& parallelFor) const;
+  MultigridLine lineOf(const Level& fine, const int at[3], std::int64_t begin) const;
+  /** coarse.b += P^T (b - A x) of the row's red voxels; black ones have no residual. */
+  void restrictRow(const DiffusionOperator& A, const Level& fine, Level& coarse, std::int64_t row,
+    const float* b, const float* x) const;
+  /** x += P coarse.x on the row's red voxels; black ones are relaxed next, whatever they are. */
+  void prolongRow(const DiffusionOperator& A, const Level& fine, const Level& coarse,
+    std::int64_t row, float* x) const;
 
   const DiffusionOperator* finest = nullptr;
   std::deque<Level> levels;
+  Buffer<float> first, firstImage; // of level 1, see solveCoarse
 };
 } // namespace lighttransport
 
