@@ -52,15 +52,15 @@
  * With RGBExtinction there are three times as many components: see there.
  *
  * Float32 alone: VTK has no 16-bit floats that readers and filters would understand.
- * On the GPU the volume mapper keeps them in 16 bits; to save memory here, take a
- * ResolutionFactor of 2 (an eighth).
+ * On the GPU the mappers keep fewer bits (volumes 8, surfaces 16); to save memory here,
+ * take a ResolutionFactor of 2 (an eighth).
  *
  * This filter is not for scattered light: what was extinguished is gone. For that
  * see vtkLightDiffusionFilter.
  *
  * Bad input gives one error (what, value, expected) and an empty output.
  *
- * @sa vtkLightTransportVolumeMapper vtkLightDiffusionFilter
+ * @sa vtkLightTransportVolumeMapper vtkLightTransportPolyDataMapper vtkLightDiffusionFilter
  */
 #ifndef vtkVisibilityFactorFilter_h
 #define vtkVisibilityFactorFilter_h

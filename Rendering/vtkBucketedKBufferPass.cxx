@@ -2,41 +2,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkBucketedKBufferPass.h"
 
-#include "vtkBucketedKBufferBlend.h"
+#include "KBuffer.h"
 #include "vtkBucketedKBufferData.h"
-#include "vtkBucketedKBufferList.h"
-#include "vtkBucketedKBufferRead.h"
+#include "vtkBucketedKBufferExtensions.h"
+#include "vtkBucketedKBufferFlatNormal.h"
 #include "vtkBucketedKBufferStore.h"
-#include "vtkLightTransportCompat.h"
+#include "vtkCurvatureOpacityPolyDataMapper.h"
+#include "vtkCurvatureOpacityProperty.h"
 
+#include "vtkCompositeDataSet.h"
 #include "vtkDualDepthPeelingPass.h"
 #include "vtkInformation.h"
 #include "vtkInformationIntegerKey.h"
+#include "vtkMapper.h"
+#include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLActor.h"
 #include "vtkOpenGLError.h"
-#include "vtkOpenGLFramebufferObject.h"
-#include "vtkOpenGLQuadHelper.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLRenderer.h"
-#include "vtkOpenGLShaderCache.h"
 #include "vtkOpenGLState.h"
+#include "vtkPolyData.h"
 #include "vtkProp.h"
+#include "vtkPropCollection.h"
 #include "vtkProperty.h"
 #include "vtkRenderState.h"
 #include "vtkRenderStepsPass.h"
-#include "vtkRenderer.h"
 #include "vtkShaderProgram.h"
 #include "vtkSmartPointer.h"
 #include "vtkTextureObject.h"
-#include "vtkTextureUnitManager.h"
 #include "vtkTranslucentPass.h"
 #include "vtkVersion.h"
-#include "vtkWeakPointer.h"
-
-// GLEW or glad, by VTK's version.
-#include LIGHTTRANSPORT_GL_HEADER
 
 #include <algorithm>
 #include <array>
@@ -44,193 +41,12 @@
 #include <unordered_map>
 #include <vector>
 
+using lighttransport::KBuffer;
+
 namespace
 {
-/** VTK writes #version 150, until 9.6 at least; all of these are part of OpenGL 4.3. */
-const char* const Extensions = "#extension GL_ARB_shader_storage_buffer_object : require\n"
-                               "#extension GL_ARB_shading_language_420pack : require\n"
-                               "#extension GL_ARB_shading_language_packing : require\n"
-                               "#extension GL_ARB_shader_bit_encoding : require\n";
-
-constexpr GLuint EndOfList = 0xFFFFFFFFU;
-
-/** A shader storage buffer and where it is bound; see vtkBucketedKBufferData.glsl. */
-class StorageBuffer
-{
-public:
-  explicit StorageBuffer(GLuint binding)
-    : Binding(binding)
-  {
-  }
-  StorageBuffer(const StorageBuffer&) = delete;
-  StorageBuffer& operator=(const StorageBuffer&) = delete;
-
-  /** At least so many bytes; what was in it is lost where it grows. */
-  void Reserve(vtkTypeInt64 bytes)
-  {
-    if (this->Id == 0)
-    {
-      glGenBuffers(1, &this->Id);
-    }
-    if (this->Bytes < bytes)
-    {
-      glBindBuffer(GL_SHADER_STORAGE_BUFFER, this->Id);
-      glBufferData(
-        GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);
-      this->Bytes = bytes;
-    }
-  }
-  /** As a texture buffer, on a texture unit. */
-  void BindTexture(vtkOpenGLState* state, int unit, GLenum format)
-  {
-    if (this->Texture == 0)
-    {
-      glGenTextures(1, &this->Texture);
-    }
-    state->vtkglActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
-    glBindTexture(GL_TEXTURE_BUFFER, this->Texture);
-    glTexBuffer(GL_TEXTURE_BUFFER, format, this->Id);
-  }
-  void Bind() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, this->Binding, this->Id); }
-  void Unbind() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, this->Binding, 0); }
-  void Fill(vtkTypeInt64 offset, vtkTypeInt64 bytes, GLuint value) const
-  {
-    glBindBuffer(GL_SHADER_STORAGE_BUFFER, this->Id);
-    glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, static_cast<GLintptr>(offset),
-      static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
-  }
-  GLuint Read(int index) const
-  {
-    GLuint value = 0;
-    glBindBuffer(GL_SHADER_STORAGE_BUFFER, this->Id);
-    glGetBufferSubData(
-      GL_SHADER_STORAGE_BUFFER, index * GLintptr(sizeof(GLuint)), sizeof(GLuint), &value);
-    return value;
-  }
-  void Release()
-  {
-    if (this->Id != 0)
-    {
-      glDeleteBuffers(1, &this->Id);
-    }
-    if (this->Texture != 0)
-    {
-      glDeleteTextures(1, &this->Texture);
-    }
-    this->Id = 0;
-    this->Texture = 0;
-    this->Bytes = 0;
-  }
-
-  vtkTypeInt64 Bytes = 0;
-
-private:
-  GLuint Binding;
-  GLuint Id = 0;
-  GLuint Texture = 0;
-};
-
-enum Counters
-{
-  NodesAsked = 0,
-  FragmentsListed = 1,
-  FragmentsMerged = 2,
-  NumberOfCounters = 4
-};
-
-//------------------------------------------------------------------------------
-/** The depth of what is bound for reading, as a format that it can be copied to. */
-bool readsStencilToo()
-{
-  GLint stencil = 0;
-  GLint type = 0;
-  GLint object = 0;
-  glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &object);
-  const GLenum attachment = object == 0 ? GL_STENCIL : GL_STENCIL_ATTACHMENT;
-  glGetFramebufferAttachmentParameteriv(
-    GL_READ_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE, &type);
-  if (type != GL_NONE)
-  {
-    glGetFramebufferAttachmentParameteriv(
-      GL_READ_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_STENCIL_SIZE, &stencil);
-  }
-  return stencil > 0;
-}
-
-//------------------------------------------------------------------------------
-/** vtkTextureObject's name for the depth that is bound for reading; -1: there is none. */
-int depthFormatRead()
-{
-  GLint object = 0;
-  GLint type = 0;
-  glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &object);
-  const GLenum attachment = object == 0 ? GL_DEPTH : GL_DEPTH_ATTACHMENT;
-  glGetFramebufferAttachmentParameteriv(
-    GL_READ_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE, &type);
-  if (type == GL_NONE)
-  {
-    return -1;
-  }
-  GLint bits = 0;
-  GLint component = 0;
-  glGetFramebufferAttachmentParameteriv(
-    GL_READ_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_DEPTH_SIZE, &bits);
-  glGetFramebufferAttachmentParameteriv(
-    GL_READ_FRAMEBUFFER, attachment, GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE, &component);
-  if (component == GL_FLOAT)
-  {
-    return vtkTextureObject::Float32;
-  }
-  return bits <= 16 ? vtkTextureObject::Fixed16
-                    : (bits <= 24 ? vtkTextureObject::Fixed24 : vtkTextureObject::Fixed32);
-}
-
-//------------------------------------------------------------------------------
-/** What the picture is drawn into. */
-struct Target
-{
-  bool clamps = true; // holds colours in [0,1]
-  bool plain = false; // 8 bits, one sample, linear: blended in the shader, rounded once
-};
-
-Target targetBound()
-{
-  Target target;
-  GLint object = 0;
-  GLint buffer = 0;
-  glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &object);
-  glGetIntegerv(GL_DRAW_BUFFER0, &buffer);
-  if (object == 0 || buffer < GL_COLOR_ATTACHMENT0 || buffer > GL_COLOR_ATTACHMENT0 + 15)
-  {
-    return target;
-  }
-  const auto attachment = static_cast<GLenum>(buffer);
-  const auto ask = [attachment](GLenum what)
-  {
-    GLint value = 0;
-    glGetFramebufferAttachmentParameteriv(GL_DRAW_FRAMEBUFFER, attachment, what, &value);
-    return value;
-  };
-  if (ask(GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE) == GL_NONE)
-  {
-    return target;
-  }
-  GLint samples = 0;
-  GLint readObject = 0;
-  glGetIntegerv(GL_SAMPLE_BUFFERS, &samples);
-  glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &readObject);
-  target.clamps = ask(GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE) != GL_FLOAT;
-  target.plain = target.clamps && samples == 0 && readObject == object &&
-    ask(GL_FRAMEBUFFER_ATTACHMENT_RED_SIZE) == 8 &&
-    ask(GL_FRAMEBUFFER_ATTACHMENT_ALPHA_SIZE) == 8 && glIsEnabled(GL_FRAMEBUFFER_SRGB) == GL_FALSE;
-  return target;
-}
-
-//------------------------------------------------------------------------------
-std::string define(const char* name, int value)
-{
-  return std::string("#define ") + name + " " + std::to_string(value) + "\n";
-}
+constexpr int MostShapes = 1 << 24;
+constexpr std::size_t MostStyles = 255;
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -255,246 +71,87 @@ class vtkBucketedKBufferPass::vtkInternals
 {
 public:
   vtkSmartPointer<vtkRenderPass> TranslucentPass = vtkSmartPointer<vtkTranslucentPass>::New();
+  vtkSmartPointer<vtkCurvatureOpacityProperty> Property =
+    vtkSmartPointer<vtkCurvatureOpacityProperty>::New();
   vtkNew<vtkRenderStepsPass> Steps;
   vtkNew<vtkTranslucentStep> Step;
   vtkSmartPointer<vtkDualDepthPeelingPass> Fallback;
   std::string Told; // the reason for the fallback, once told
 
-  // OpenGL objects, of one window
-  vtkWeakPointer<vtkOpenGLRenderWindow> Window;
-  StorageBuffer Heads{ 0 };
-  StorageBuffer Links{ 1 };
-  StorageBuffer Colors{ 2 };
-  StorageBuffer Surfaces{ 3 };
-  StorageBuffer CounterBuffer{ 4 };
-  vtkSmartPointer<vtkTextureObject> OpaqueDepth;
-  int OpaqueDepthFormat = -1;
-  vtkSmartPointer<vtkOpenGLFramebufferObject> DepthTarget;
-  vtkSmartPointer<vtkTextureObject> TargetColor;
-  vtkSmartPointer<vtkOpenGLFramebufferObject> GeometryTarget;
-  std::unique_ptr<vtkOpenGLQuadHelper> Blend;
-  std::string BlendKey;
-  vtkTypeInt64 LargestBlock = 0; // GL_MAX_SHADER_STORAGE_BLOCK_SIZE
-  vtkTypeInt64 MostTexels = 0;   // GL_MAX_TEXTURE_BUFFER_SIZE
-
-  // of this frame
-  int Size[2] = { 0, 0 };
-  int Origin[2] = { 0, 0 };
-  vtkTypeInt64 Capacity = 0; // nodes
-  bool Style = false;
-  bool FloatColor = false;
-  Target Into;
+  KBuffer Buffer;
   std::unordered_map<vtkProp*, int> Shapes; // first shape of a prop
-  vtkTypeInt64 Merged = -1;                 // -1: to be read
+  int NextShape = 0;
   std::string FailedTag;
-
-  std::vector<int> Units; // texture units in use
+  vtkTypeInt64 Merged = 0; // -1: to be read
 
   // between frames
   int Bands = 1;
-  bool ShaderStyle = false;
-  bool ShaderFloatColor = false;
+  std::string ShaderKey;
   vtkTimeStamp ShaderTime;
 
-  int BitsPerFragment() const
+  void Release(vtkWindow* window)
   {
-    return 32 + 32 + (this->FloatColor ? 128 : 64) + (this->Style ? 64 : 0);
+    this->Buffer.Release(window);
+    this->Merged = std::max<vtkTypeInt64>(this->Merged, 0);
   }
-  std::array<StorageBuffer*, 5> Buffers()
-  {
-    return { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->CounterBuffer };
-  }
-  std::string Defines(int room) const
-  {
-    return define("LT_READ_TARGET", this->Into.plain) +
-      std::string("#define LT_NONE 0xFFFFFFFFu\n#define LT_NO_NORMAL 0x80008000u\n") +
-      define("LT_STYLE", this->Style) + define("LT_FLOAT_COLOR", this->FloatColor) +
-      define("LT_ROOM", room);
-  }
-  void ReserveNodes(vtkTypeInt64 nodes)
-  {
-    this->Links.Reserve(nodes * 8);
-    this->Colors.Reserve(nodes * (this->FloatColor ? 16 : 8));
-    if (this->Style)
-    {
-      this->Surfaces.Reserve(nodes * 8);
-    }
-    this->Capacity = nodes;
-  }
-  void BindForReading(vtkOpenGLRenderWindow* window, vtkShaderProgram* program)
-  {
-    struct Reader
-    {
-      StorageBuffer* buffer;
-      const char* name;
-      GLenum format;
-    };
-    const GLenum color = this->FloatColor ? GL_RGBA32F : GL_RGBA16F;
-    for (const Reader& r : { Reader{ &this->Heads, "ltHeads", GL_R32UI },
-           Reader{ &this->Links, "ltLinks", GL_RG32UI }, Reader{ &this->Colors, "ltColors", color },
-           Reader{ &this->Surfaces, "ltSurfaces", GL_RG32UI } })
-    {
-      if (r.buffer->Bytes > 0 && program->IsUniformUsed(r.name))
-      {
-        this->Units.push_back(window->GetState()->GetTextureUnitManager()->Allocate());
-        r.buffer->BindTexture(window->GetState(), this->Units.back(), r.format);
-        program->SetUniformi(r.name, this->Units.back());
-      }
-    }
-  }
-  void FreeUnits(vtkOpenGLRenderWindow* window)
-  {
-    for (const int unit : this->Units)
-    {
-      window->GetState()->vtkglActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
-      glBindTexture(GL_TEXTURE_BUFFER, 0);
-      window->GetState()->GetTextureUnitManager()->Free(unit);
-    }
-    this->Units.clear();
-  }
-  void Release(vtkWindow* window);
-  std::string WhyNot(vtkOpenGLRenderWindow* window);
-  void CopyOpaqueDepth(vtkOpenGLRenderWindow* window);
-  vtkTypeInt64 MostNodes(vtkTypeInt64 memoryLimit) const;
+  void FindShapes(vtkProp** props, int count);
 };
 
 vtkStandardNewMacro(vtkBucketedKBufferPass::vtkTranslucentStep);
 vtkStandardNewMacro(vtkBucketedKBufferPass);
 
 //------------------------------------------------------------------------------
-void vtkBucketedKBufferPass::vtkInternals::Release(vtkWindow* window)
+/** Numbers for the shapes of all actors, and the styles in use. */
+void vtkBucketedKBufferPass::vtkInternals::FindShapes(vtkProp** props, int count)
 {
-  for (StorageBuffer* buffer : this->Buffers())
+  KBuffer& buffer = this->Buffer;
+  this->Shapes.clear();
+  this->NextShape = 0;
+  buffer.Styles.assign(1, this->Property);
+  vtkNew<vtkPropCollection> actors;
+  for (int i = 0; i < count; ++i)
   {
-    buffer->Release();
+    props[i]->GetActors(actors);
   }
-  for (auto* texture : { &this->OpaqueDepth, &this->TargetColor })
+  vtkCollectionSimpleIterator it;
+  actors->InitTraversal(it);
+  while (vtkProp* prop = actors->GetNextProp(it))
   {
-    if (*texture)
+    auto* actor = vtkActor::SafeDownCast(prop);
+    vtkMapper* mapper = actor ? actor->GetMapper() : nullptr;
+    vtkIdType shapes = 1;
+    if (auto* own = vtkCurvatureOpacityPolyDataMapper::SafeDownCast(mapper))
     {
-      (*texture)->ReleaseGraphicsResources(window);
-      *texture = nullptr;
+      vtkCurvatureOpacityProperty* property = own->GetCurvatureOpacityProperty();
+      if (std::find(buffer.Styles.begin(), buffer.Styles.end(), property) == buffer.Styles.end() &&
+        buffer.Styles.size() < MostStyles)
+      {
+        buffer.Styles.emplace_back(property);
+      }
+      // The array is looked at when it is drawn: no more shapes than cells.
+      if (!own->GetShapeIdArray().empty() && own->GetInput())
+      {
+        shapes = own->GetInput()->GetNumberOfCells();
+      }
     }
-  }
-  for (auto* target : { &this->DepthTarget, &this->GeometryTarget })
-  {
-    if (*target)
+    else if (mapper)
     {
-      (*target)->ReleaseGraphicsResources(window);
-      *target = nullptr;
+      // A block's shape is the number of its first cell; see PostReplaceShaderValues.
+      if (auto* blocks = vtkCompositeDataSet::SafeDownCast(mapper->GetInputDataObject(0, 0)))
+      {
+        shapes = blocks->GetNumberOfCells();
+      }
     }
+    this->Shapes[prop] = this->NextShape;
+    shapes = std::min<vtkIdType>(std::max<vtkIdType>(shapes, 1), MostShapes - 1);
+    this->NextShape = (this->NextShape + static_cast<int>(shapes)) % MostShapes;
   }
-  this->OpaqueDepthFormat = -1;
-  this->Blend.reset();
-  this->BlendKey.clear();
-  this->Capacity = 0;
-  this->Merged = std::max<vtkTypeInt64>(this->Merged, 0);
-  this->Window = nullptr;
-}
-
-//------------------------------------------------------------------------------
-/** Why this window cannot be drawn to; empty if it can. */
-std::string vtkBucketedKBufferPass::vtkInternals::WhyNot(vtkOpenGLRenderWindow* window)
-{
-  GLint major = 0;
-  GLint minor = 0;
-  glGetIntegerv(GL_MAJOR_VERSION, &major);
-  glGetIntegerv(GL_MINOR_VERSION, &minor);
-  if (10 * major + minor < 43)
+  buffer.Now.style = false;
+  buffer.Now.lines = false;
+  for (const auto& style : buffer.Styles)
   {
-    return "OpenGL is " + std::to_string(major) + "." + std::to_string(minor) +
-      ", expected 4.3 or later";
+    buffer.Now.style = buffer.Now.style || style->HasEffect();
   }
-  if (this->LargestBlock == 0)
-  {
-    GLint64 largest = 0;
-    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
-    GLint texels = 0;
-    glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
-    this->LargestBlock = largest;
-    this->MostTexels = texels;
-  }
-  const vtkTypeInt64 most = std::min(this->LargestBlock / 4, this->MostTexels);
-  if (vtkTypeInt64(this->Size[0]) * this->Size[1] > most)
-  {
-    return "the viewport has " + std::to_string(this->Size[0]) + " x " +
-      std::to_string(this->Size[1]) + " pixels, expected at most " + std::to_string(most) +
-      " on this GPU";
-  }
-  (void)window;
-  return std::string();
-}
-
-//------------------------------------------------------------------------------
-vtkTypeInt64 vtkBucketedKBufferPass::vtkInternals::MostNodes(vtkTypeInt64 memoryLimit) const
-{
-  // Node numbers end before LT_NONE, and are compared with an int.
-  const vtkTypeInt64 byBlock =
-    std::min(this->LargestBlock / (this->FloatColor ? 16 : 8), this->MostTexels);
-  const vtkTypeInt64 byLimit = memoryLimit / (this->BitsPerFragment() / 8);
-  return std::max<vtkTypeInt64>(
-    1024, std::min(std::min(byBlock, byLimit), vtkTypeInt64(VTK_INT_MAX)));
-}
-
-//------------------------------------------------------------------------------
-/** Copies the depth of what is bound into OpaqueDepth; far away where there is none. */
-void vtkBucketedKBufferPass::vtkInternals::CopyOpaqueDepth(vtkOpenGLRenderWindow* window)
-{
-  vtkOpenGLState* state = window->GetState();
-  const int read = depthFormatRead();
-  const int format = read < 0 ? vtkTextureObject::Float32 : read;
-  // 24 and 8 bits in one, or depth alone: blits ask for the same format.
-  const int key = format + (read >= 0 && readsStencilToo() ? 100 : 0);
-  if (!this->OpaqueDepth || this->OpaqueDepthFormat != key)
-  {
-    this->OpaqueDepth = vtkSmartPointer<vtkTextureObject>::New();
-    this->OpaqueDepth->SetContext(window);
-    if (key >= 100)
-    {
-      this->OpaqueDepth->AllocateDepthStencil(this->Size[0], this->Size[1]);
-    }
-    else
-    {
-      this->OpaqueDepth->AllocateDepth(this->Size[0], this->Size[1], format);
-    }
-    this->OpaqueDepth->SetWrapS(vtkTextureObject::ClampToEdge);
-    this->OpaqueDepth->SetWrapT(vtkTextureObject::ClampToEdge);
-    this->OpaqueDepth->SetMinificationFilter(vtkTextureObject::Nearest);
-    this->OpaqueDepth->SetMagnificationFilter(vtkTextureObject::Nearest);
-    this->OpaqueDepthFormat = key;
-    this->DepthTarget = nullptr;
-  }
-  else
-  {
-    this->OpaqueDepth->Resize(this->Size[0], this->Size[1]);
-  }
-  state->PushFramebufferBindings();
-  if (!this->DepthTarget)
-  {
-    this->DepthTarget = vtkSmartPointer<vtkOpenGLFramebufferObject>::New();
-    this->DepthTarget->SetContext(window);
-    this->DepthTarget->Bind();
-    this->DepthTarget->AddDepthAttachment(this->OpaqueDepth);
-    this->DepthTarget->DeactivateDrawBuffers();
-    this->DepthTarget->DeactivateReadBuffer();
-    state->PopFramebufferBindings();
-    state->PushFramebufferBindings();
-  }
-  this->DepthTarget->Bind(vtkOpenGLFramebufferObject::GetDrawMode());
-  state->vtkglDisable(GL_SCISSOR_TEST);
-  if (read < 0)
-  {
-    state->vtkglDepthMask(GL_TRUE);
-    state->vtkglClearDepth(1.0);
-    state->vtkglClear(GL_DEPTH_BUFFER_BIT);
-  }
-  else
-  {
-    state->vtkglBlitFramebuffer(this->Origin[0], this->Origin[1], this->Origin[0] + this->Size[0],
-      this->Origin[1] + this->Size[1], 0, 0, this->Size[0], this->Size[1], GL_DEPTH_BUFFER_BIT,
-      GL_NEAREST);
-  }
-  state->PopFramebufferBindings();
 }
 
 //------------------------------------------------------------------------------
@@ -510,10 +167,10 @@ vtkBucketedKBufferPass::vtkBucketedKBufferPass()
 vtkBucketedKBufferPass::~vtkBucketedKBufferPass()
 {
   vtkInternals& self = *this->Internals;
-  if (self.Window)
+  if (self.Buffer.Window)
   {
-    self.Window->MakeCurrent();
-    self.Release(self.Window);
+    self.Buffer.Window->MakeCurrent();
+    self.Release(self.Buffer.Window);
   }
 }
 
@@ -536,6 +193,27 @@ void vtkBucketedKBufferPass::SetTranslucentPass(vtkRenderPass* pass)
 vtkRenderPass* vtkBucketedKBufferPass::GetTranslucentPass()
 {
   return this->Internals->TranslucentPass;
+}
+
+//------------------------------------------------------------------------------
+void vtkBucketedKBufferPass::SetCurvatureOpacityProperty(vtkCurvatureOpacityProperty* property)
+{
+  vtkInternals& self = *this->Internals;
+  if (!property || self.Property != property)
+  {
+    self.Property = property;
+    if (!property)
+    {
+      self.Property = vtkSmartPointer<vtkCurvatureOpacityProperty>::New();
+    }
+    this->Modified();
+  }
+}
+
+//------------------------------------------------------------------------------
+vtkCurvatureOpacityProperty* vtkBucketedKBufferPass::GetCurvatureOpacityProperty()
+{
+  return this->Internals->Property;
 }
 
 //------------------------------------------------------------------------------
@@ -593,6 +271,8 @@ void vtkBucketedKBufferPass::RenderFallback(const vtkRenderState* s, const std::
 void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
 {
   vtkInternals& self = *this->Internals;
+  KBuffer& buffer = self.Buffer;
+  KBuffer::Settings& now = buffer.Now;
   vtkRenderer* renderer = s->GetRenderer();
   this->NumberOfRenderedProps = 0;
   this->NumberOfFragments = 0;
@@ -614,44 +294,52 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
   }
 
   auto* window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow());
-  if (self.Window != window)
+  if (buffer.Window != window)
   {
-    if (self.Window)
+    if (buffer.Window)
     {
-      self.Window->MakeCurrent();
-      self.Release(self.Window);
+      buffer.Window->MakeCurrent();
+      self.Release(buffer.Window);
       window->MakeCurrent();
     }
-    self.Window = window;
+    buffer.Window = window;
   }
   vtkOpenGLClearErrorMacro();
   if (s->GetFrameBuffer() == nullptr)
   {
-    renderer->GetTiledSizeAndOrigin(&self.Size[0], &self.Size[1], &self.Origin[0], &self.Origin[1]);
+    renderer->GetTiledSizeAndOrigin(&now.size[0], &now.size[1], &now.origin[0], &now.origin[1]);
   }
   else
   {
-    s->GetWindowSize(self.Size);
-    self.Origin[0] = 0;
-    self.Origin[1] = 0;
+    s->GetWindowSize(now.size);
+    now.origin[0] = 0;
+    now.origin[1] = 0;
   }
-  if (self.Size[0] < 1 || self.Size[1] < 1)
+  if (now.size[0] < 1 || now.size[1] < 1)
   {
     return;
   }
-  const std::string whyNot = self.WhyNot(window);
+  self.FindShapes(props, numberOfProps);
+  const std::string whyNot = buffer.WhyNot();
   if (!whyNot.empty())
   {
     this->RenderFallback(s, whyNot);
     return;
   }
-
-  self.FloatColor = this->ColorPrecision == Float;
-  self.Into = targetBound();
-  if (self.ShaderStyle != self.Style || self.ShaderFloatColor != self.FloatColor)
+  now.layers = this->NumberOfLayers;
+  now.floatColor = this->ColorPrecision == Float;
+  now.singleBucket = this->SingleBucket;
+  now.into = lighttransport::PictureTarget::Bound();
+  if (now.style)
   {
-    self.ShaderStyle = self.Style;
-    self.ShaderFloatColor = self.FloatColor;
+    buffer.SetCamera(renderer, props, numberOfProps);
+    now.curvatureScale =
+      this->CurvatureScale > 0. ? this->CurvatureScale : buffer.SceneLength / 40.;
+  }
+  const std::string shaderKey = buffer.Defines(1);
+  if (self.ShaderKey != shaderKey)
+  {
+    self.ShaderKey = shaderKey;
     self.ShaderTime.Modified();
   }
 
@@ -668,64 +356,18 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
   vtkOpenGLState::ScopedglColorMask colorMaskSaver(state);
   state->vtkglDisable(GL_MULTISAMPLE);
 
-  // 1. the opaque depth
-  self.CopyOpaqueDepth(window);
+  // 1. what is there already
+  buffer.CopyTarget();
+  const vtkTypeInt64 most = buffer.MostNodes(this->MemoryLimit);
+  if (buffer.Capacity > most)
+  {
+    buffer.ReleaseNodes();
+  }
+  buffer.ReserveNodes(
+    std::min(most, std::max(buffer.Capacity, vtkTypeInt64(now.size[0]) * now.size[1] * 2 + 1024)));
 
-  // 2. geometry, 3. blending
-  self.Heads.Reserve(vtkTypeInt64(self.Size[0]) * self.Size[1] * 4);
-  self.CounterBuffer.Reserve(NumberOfCounters * 4);
-  self.CounterBuffer.Fill(0, NumberOfCounters * 4, 0);
-  const vtkTypeInt64 most = self.MostNodes(this->MemoryLimit);
-  if (self.Capacity > most)
-  {
-    self.Links.Release();
-    self.Colors.Release();
-    self.Surfaces.Release();
-    self.Capacity = 0;
-  }
-  self.ReserveNodes(
-    std::min(most, std::max(self.Capacity, vtkTypeInt64(self.Size[0]) * self.Size[1] * 2 + 1024)));
-  if (!self.TargetColor)
-  {
-    self.TargetColor = vtkSmartPointer<vtkTextureObject>::New();
-    self.TargetColor->SetContext(window);
-    self.TargetColor->Allocate2D(self.Size[0], self.Size[1], 4, VTK_UNSIGNED_CHAR);
-  }
-  self.TargetColor->Resize(self.Size[0], self.Size[1]);
-  if (!self.GeometryTarget)
-  {
-    self.GeometryTarget = vtkSmartPointer<vtkOpenGLFramebufferObject>::New();
-    self.GeometryTarget->SetContext(window);
-    state->PushFramebufferBindings();
-    self.GeometryTarget->Bind();
-    self.GeometryTarget->AddColorAttachment(0, self.TargetColor);
-    state->PopFramebufferBindings();
-  }
-
-  if (self.Into.plain)
-  {
-    // What is there already; the geometry stage writes no colour.
-    state->PushFramebufferBindings();
-    GLint buffer = 0;
-    glGetIntegerv(GL_DRAW_BUFFER0, &buffer);
-    GLint readBuffer = 0;
-    glGetIntegerv(GL_READ_BUFFER, &readBuffer);
-    glReadBuffer(static_cast<GLenum>(buffer));
-    self.GeometryTarget->Bind(vtkOpenGLFramebufferObject::GetDrawMode());
-    self.GeometryTarget->ActivateDrawBuffers(1);
-    state->vtkglDisable(GL_SCISSOR_TEST);
-    state->vtkglColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    state->vtkglBlitFramebuffer(self.Origin[0], self.Origin[1], self.Origin[0] + self.Size[0],
-      self.Origin[1] + self.Size[1], 0, 0, self.Size[0], self.Size[1], GL_COLOR_BUFFER_BIT,
-      GL_NEAREST);
-    glReadBuffer(static_cast<GLenum>(readBuffer));
-    state->PopFramebufferBindings();
-  }
-
-  self.Shapes.clear();
   for (int i = 0; i < numberOfProps; ++i)
   {
-    self.Shapes[props[i]] = i;
     // vtkOpenGLActor leaves the depth mask alone.
     vtkInformation* keys = props[i]->GetPropertyKeys();
     if (!keys)
@@ -740,11 +382,11 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
 
   // As many bands as the last frame needed; one that has no room is halved.
   std::vector<std::array<int, 2>> bands;
-  const int startBands = std::min(self.Bands, self.Size[1]);
+  const int startBands = std::min(self.Bands, now.size[1]);
   for (int b = startBands; b > 0; --b)
   {
-    bands.push_back({ static_cast<int>(vtkTypeInt64(self.Size[1]) * (b - 1) / startBands),
-      static_cast<int>(vtkTypeInt64(self.Size[1]) * b / startBands) });
+    bands.push_back({ static_cast<int>(vtkTypeInt64(now.size[1]) * (b - 1) / startBands),
+      static_cast<int>(vtkTypeInt64(now.size[1]) * b / startBands) });
   }
   while (!bands.empty())
   {
@@ -759,7 +401,7 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
     bands.push_back({ middle, band[1] });
     bands.push_back({ band[0], middle });
   }
-  self.Bands = this->NumberOfBands > 1 ? this->NumberOfBands : 1;
+  self.Bands = std::max(this->NumberOfBands, 1);
   self.Merged = -1;
 
   this->PostRender(s);
@@ -767,11 +409,7 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
   {
     props[i]->GetPropertyKeys()->Remove(vtkOpenGLActor::GLDepthMaskOverride());
   }
-  for (StorageBuffer* buffer : self.Buffers())
-  {
-    buffer->Unbind();
-  }
-  glBindBuffer(GL_SHADER_STORAGE_BUFFER, 0);
+  buffer.Unbind();
   if (!self.FailedTag.empty())
   {
     vtkErrorMacro("A shader has no " << self.FailedTag << " (VTK " << vtkVersion::GetVTKVersion()
@@ -786,49 +424,29 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
 /** Rows first to last - 1; false, and nothing drawn, where the nodes don't fit. */
 bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int last)
 {
-  vtkInternals& self = *this->Internals;
-  auto* window = vtkOpenGLRenderWindow::SafeDownCast(s->GetRenderer()->GetRenderWindow());
-  vtkOpenGLState* state = window->GetState();
-  const int width = self.Size[0];
+  KBuffer& buffer = this->Internals->Buffer;
+  vtkRenderPass* translucent = this->Internals->TranslucentPass;
+  // More rows on either side, for neighbours, and for the neighbours' neighbours.
+  const int around = buffer.Now.style ? (buffer.Now.lines ? 2 : 1) : 0;
+  const int low = std::max(first - around, 0);
+  const int high = std::min(last + around, buffer.Now.size[1]);
 
   // 2. geometry
   vtkTypeInt64 nodes = 0;
   while (true)
   {
-    self.Heads.Fill(
-      vtkTypeInt64(first) * width * 4, vtkTypeInt64(last - first) * width * 4, EndOfList);
-    self.CounterBuffer.Fill(NodesAsked, 4, 0);
-    for (StorageBuffer* buffer : self.Buffers())
-    {
-      buffer->Bind();
-    }
-    state->PushFramebufferBindings();
-    self.GeometryTarget->Bind();
-    self.GeometryTarget->ActivateDrawBuffers(1);
-    state->vtkglViewport(0, 0, width, self.Size[1]);
-    state->vtkglEnable(GL_SCISSOR_TEST);
-    state->vtkglScissor(0, first, width, last - first);
-    state->vtkglDisable(GL_DEPTH_TEST);
-    state->vtkglDisable(GL_BLEND);
-    state->vtkglDepthMask(GL_FALSE);
-    state->vtkglColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    self.OpaqueDepth->Activate();
-    self.TranslucentPass->Render(s);
+    buffer.BeginGeometry(low, high);
+    translucent->Render(s);
+    nodes = buffer.EndGeometry();
     ++this->NumberOfGeometryPasses;
-    self.OpaqueDepth->Deactivate();
-    state->PopFramebufferBindings();
-    glMemoryBarrier(
-      GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
-
-    nodes = self.CounterBuffer.Read(NodesAsked);
-    if (nodes <= self.Capacity)
+    if (nodes <= buffer.Capacity)
     {
       break;
     }
-    const vtkTypeInt64 most = self.MostNodes(this->MemoryLimit);
+    const vtkTypeInt64 most = buffer.MostNodes(this->MemoryLimit);
     if (nodes <= most)
     {
-      self.ReserveNodes(std::min(most, nodes + nodes / 8));
+      buffer.ReserveNodes(std::min(most, nodes + nodes / 8));
     }
     else if (last - first > 1)
     {
@@ -836,66 +454,33 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
     }
     else
     {
-      vtkErrorMacro("A row of " << width << " pixels has " << nodes
+      vtkErrorMacro("A row of " << buffer.Now.size[0] << " pixels has " << nodes
                                 << " fragments, more than MemoryLimit or the GPU has room for ("
-                                << self.Capacity << "); some are left out.");
+                                << buffer.Capacity << "); some are left out.");
+      nodes = buffer.Capacity;
       break;
     }
   }
   this->NumberOfFragments += nodes;
-  this->NumberOfRenderedProps = self.TranslucentPass->GetNumberOfRenderedProps();
+  this->NumberOfRenderedProps = translucent->GetNumberOfRenderedProps();
 
-  // 3. blending
-  int room = 8;
-  while (room < this->NumberOfLayers)
+  // 3. order, 4. neighbours, 5. blending
+  if (buffer.Now.style)
   {
-    room *= 2;
+    const std::string problem = buffer.OrderAndMatch(low, high, nodes);
+    if (!problem.empty())
+    {
+      vtkErrorMacro("A compute shader " << problem);
+      return true;
+    }
   }
-  const std::string key = self.Defines(room);
-  if (!self.Blend || self.BlendKey != key)
-  {
-    const std::string source = std::string("//VTK::System::Dec\n") + Extensions +
-      "//VTK::Output::Dec\n" + key + vtkBucketedKBufferRead + vtkBucketedKBufferList +
-      vtkBucketedKBufferBlend;
-    self.Blend = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, source.c_str(), nullptr);
-    self.BlendKey = key;
-  }
-  else
-  {
-    window->GetShaderCache()->ReadyShaderProgram(self.Blend->Program);
-  }
-  if (!self.Blend->Program)
-  {
-    return true; // VTK has said why
-  }
-  state->vtkglViewport(self.Origin[0], self.Origin[1], width, self.Size[1]);
-  state->vtkglScissor(self.Origin[0], self.Origin[1] + first, width, last - first);
-  // Blending in 8 bits rounds more than once.
-  if (self.Into.plain)
-  {
-    state->vtkglDisable(GL_BLEND);
-    self.TargetColor->Activate();
-    self.Blend->Program->SetUniformi("ltTarget", self.TargetColor->GetTextureUnit());
-  }
-  else
-  {
-    state->vtkglEnable(GL_BLEND);
-  }
-  state->vtkglDisable(GL_CULL_FACE);
-  state->vtkglColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  state->vtkglBlendFuncSeparate(GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  self.BindForReading(window, self.Blend->Program);
-  self.Blend->Program->SetUniformi("ltLayers", this->NumberOfLayers);
-  self.Blend->Program->SetUniform2i("ltSize", self.Size);
-  self.Blend->Render();
-  self.FreeUnits(window);
-  self.TargetColor->Deactivate();
+  buffer.Blend(first, last); // where its shader isn't built, VTK says why
   return true;
 }
 
 //------------------------------------------------------------------------------
 bool vtkBucketedKBufferPass::PostReplaceShaderValues(std::string& /*vertexShader*/,
-  std::string& /*geometryShader*/, std::string& fragmentShader, vtkAbstractMapper* /*mapper*/,
+  std::string& /*geometryShader*/, std::string& fragmentShader, vtkAbstractMapper* mapper,
   vtkProp* /*prop*/)
 {
   vtkInternals& self = *this->Internals;
@@ -906,33 +491,87 @@ bool vtkBucketedKBufferPass::PostReplaceShaderValues(std::string& /*vertexShader
       self.FailedTag = tag;
     }
   };
-  substitute("//VTK::System::Dec", std::string("//VTK::System::Dec\n") + Extensions);
+  std::string declarations =
+    self.Buffer.Defines(1) + vtkBucketedKBufferData + vtkBucketedKBufferStore;
+  // Within the prop: a value of an array, or a composite's block, known by its first cell.
+  std::string shape = "0u";
+  std::string normal = "LT_NO_NORMAL";
+  if (self.Buffer.Now.style)
+  {
+    auto* own = vtkCurvatureOpacityPolyDataMapper::SafeDownCast(mapper);
+    if (own && own->HasShapeIds())
+    {
+      declarations += "uniform samplerBuffer ltShapeIds;\n";
+      shape = "uint(texelFetch(ltShapeIds, gl_PrimitiveID + PrimitiveIDOffset).x)";
+    }
+    else if (mapper->IsA("vtkCompositeMapperHelper2"))
+    {
+      shape = "uint(PrimitiveIDOffset)";
+    }
+    if (fragmentShader.find("vec3 normalVCVSOutput = ") != std::string::npos)
+    {
+      normal = "ltOutwardNormal(normalVCVSOutput)"; // VTK has turned it to the eye
+    }
+    else
+    {
+      // Not lit: VTK makes no normal.
+      declarations += vtkBucketedKBufferFlatNormal;
+      substitute(
+        "//VTK::UniformFlow::Impl", "vec3 ltFlat = ltFlatNormal();\n//VTK::UniformFlow::Impl");
+      normal = "ltOutwardNormal(ltFlat)";
+    }
+  }
   substitute(
-    "//VTK::DepthPeeling::Dec", self.Defines(1) + vtkBucketedKBufferData + vtkBucketedKBufferStore);
+    "//VTK::System::Dec", std::string("//VTK::System::Dec\n") + vtkBucketedKBufferExtensions);
+  substitute("//VTK::DepthPeeling::Dec", declarations);
   // Where the mapper has set the depth itself, the tag is gone.
   vtkShaderProgram::Substitute(
     fragmentShader, "//VTK::Depth::Impl", "gl_FragDepth = gl_FragCoord.z;\n", false);
-  substitute(
-    "//VTK::DepthPeeling::Impl", "ltStore(gl_FragData[0], gl_FragDepth, 0u, LT_NO_NORMAL);\n");
+  substitute("//VTK::DepthPeeling::Impl",
+    "ltStore(gl_FragData[0], gl_FragDepth, " + shape + ", " + normal + ");\n");
   return true;
 }
 
 //------------------------------------------------------------------------------
 bool vtkBucketedKBufferPass::SetShaderParameters(vtkShaderProgram* program,
-  vtkAbstractMapper* /*mapper*/, vtkProp* prop, vtkOpenGLVertexArrayObject* /*VAO*/)
+  vtkAbstractMapper* mapper, vtkProp* prop, vtkOpenGLVertexArrayObject* /*VAO*/)
 {
   vtkInternals& self = *this->Internals;
-  program->SetUniformi("ltOpaqueDepth", self.OpaqueDepth->GetTextureUnit());
-  program->SetUniformi("ltWidth", self.Size[0]);
-  program->SetUniformi("ltCapacity", static_cast<int>(self.Capacity));
-  program->SetUniformi("ltClampColor", self.Into.clamps);
+  KBuffer& buffer = self.Buffer;
+  program->SetUniformi("ltOpaqueDepth", buffer.OpaqueDepth->GetTextureUnit());
+  program->SetUniformi("ltWidth", buffer.Now.size[0]);
+  program->SetUniformi("ltCapacity", static_cast<int>(buffer.Capacity));
+  program->SetUniformi("ltClampColor", buffer.Now.into.clamps);
   auto* actor = vtkActor::SafeDownCast(prop);
   program->SetUniformi(
     "ltThin", actor && actor->GetProperty()->GetRepresentation() != VTK_SURFACE ? 1 : 0);
-  if (program->IsUniformUsed("ltShape"))
+  if (!buffer.Now.style)
   {
-    const auto shape = self.Shapes.find(prop);
-    program->SetUniformi("ltShape", shape == self.Shapes.end() ? 0 : shape->second);
+    return true;
+  }
+  unsigned int style = 0;
+  if (auto* own = vtkCurvatureOpacityPolyDataMapper::SafeDownCast(mapper))
+  {
+    own->SetShapeIds(program);
+    const auto found =
+      std::find(buffer.Styles.begin(), buffer.Styles.end(), own->GetCurvatureOpacityProperty());
+    style =
+      found == buffer.Styles.end() ? 0 : static_cast<unsigned int>(found - buffer.Styles.begin());
+  }
+  auto shape = self.Shapes.find(prop);
+  if (shape == self.Shapes.end())
+  {
+    shape = self.Shapes.emplace(prop, self.NextShape).first;
+    self.NextShape = (self.NextShape + 1) % MostShapes;
+  }
+  program->SetUniformi("ltStyle", static_cast<int>(style));
+  program->SetUniformi("ltShape", shape->second);
+  if (program->IsUniformUsed("ltDCToVC"))
+  {
+    program->SetUniformMatrix("ltDCToVC", buffer.DCToVC);
+    const float viewport[2] = { static_cast<float>(buffer.Now.size[0]),
+      static_cast<float>(buffer.Now.size[1]) };
+    program->SetUniform2f("ltViewport", viewport);
   }
   return true;
 }
@@ -950,11 +589,11 @@ vtkTypeInt64 vtkBucketedKBufferPass::GetNumberOfMergedFragments()
   if (self.Merged < 0)
   {
     self.Merged = 0;
-    if (self.Window)
+    if (self.Buffer.Window)
     {
-      self.Window->MakeCurrent();
+      self.Buffer.Window->MakeCurrent();
       glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-      self.Merged = self.CounterBuffer.Read(FragmentsMerged);
+      self.Merged = self.Buffer.Counter.Read(KBuffer::FragmentsMerged);
       glBindBuffer(GL_SHADER_STORAGE_BUFFER, 0);
     }
   }
@@ -964,28 +603,22 @@ vtkTypeInt64 vtkBucketedKBufferPass::GetNumberOfMergedFragments()
 //------------------------------------------------------------------------------
 vtkTypeInt64 vtkBucketedKBufferPass::GetMemoryInBytes()
 {
-  vtkTypeInt64 bytes = 0;
-  for (const StorageBuffer* buffer : this->Internals->Buffers())
-  {
-    bytes += buffer->Bytes;
-  }
-  return bytes;
+  return this->Internals->Buffer.Bytes();
 }
 
 //------------------------------------------------------------------------------
 int vtkBucketedKBufferPass::GetBitsPerFragment()
 {
-  this->Internals->FloatColor = this->ColorPrecision == Float;
-  return this->Internals->BitsPerFragment();
+  return this->Internals->Buffer.BitsPerFragment();
 }
 
 //------------------------------------------------------------------------------
 void vtkBucketedKBufferPass::ReleaseGraphicsResources(vtkWindow* window)
 {
   vtkInternals& self = *this->Internals;
-  if (self.Window && self.Window == window)
+  if (self.Buffer.Window && self.Buffer.Window == window)
   {
-    self.Window->MakeCurrent();
+    self.Buffer.Window->MakeCurrent();
     self.Release(window);
   }
   self.TranslucentPass->ReleaseGraphicsResources(window);
@@ -1003,9 +636,13 @@ void vtkBucketedKBufferPass::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "NumberOfLayers: " << this->NumberOfLayers << "\n";
   os << indent << "ColorPrecision: " << (this->ColorPrecision == Float ? "Float" : "Half") << "\n";
   os << indent << "MemoryLimit: " << this->MemoryLimit << "\n";
+  os << indent << "CurvatureScale: " << this->CurvatureScale << "\n";
+  os << indent << "SingleBucket: " << this->SingleBucket << "\n";
   os << indent << "NumberOfFragments: " << this->NumberOfFragments << "\n";
   os << indent << "NumberOfBands: " << this->NumberOfBands << "\n";
   os << indent << "NumberOfGeometryPasses: " << this->NumberOfGeometryPasses << "\n";
   os << indent << "UsedFallback: " << this->UsedFallback << "\n";
   os << indent << "TranslucentPass: " << this->Internals->TranslucentPass.Get() << "\n";
+  os << indent << "CurvatureOpacityProperty:\n";
+  this->Internals->Property->PrintSelf(os, indent.GetNextIndent());
 }

@@ -34,9 +34,19 @@
  *    the nodes do not fit, the buffers grow and the stage is run again; if they
  *    fit into no buffer (GL_MAX_SHADER_STORAGE_BLOCK_SIZE, MemoryLimit), the
  *    viewport is drawn in as many horizontal bands as needed;
- * 3. blending: the NumberOfLayers nearest nodes of each pixel are sorted and
- *    blended front to back with "over" (Porter and Duff 1984), what is behind
- *    them is merged into one layer.
+ * 3. order (compute): the NumberOfLayers nearest nodes of each pixel are sorted by
+ *    depth, what is behind them is merged into one layer; with stylisation they are
+ *    then ordered by shape, and the buckets of the shapes are entered in the pixel's
+ *    hash table;
+ * 4. neighbours (compute, with stylisation only): in the four pixels around, the
+ *    fragment of the same shape with the least
+ *      epsilon = (1 - n . n') + |z - z'|^2,   z in footprints of a pixel
+ *    if each is the other's best. Only the shape's bucket is searched;
+ * 5. blending: curvature from the neighbours and stylisation
+ *    (vtkCurvatureOpacityProperty), then front to back "over" (Porter and Duff 1984).
+ *
+ * A shape is an actor, a block of a composite, or a value of an array
+ * (vtkCurvatureOpacityPolyDataMapper, whose own property then counts).
  *
  * The thesis (Murray 2018, section 2.3.2) draws the geometry twice, to keep 16
  * bits of depth and 16 of shape in one atomic word. Lists need one pass, full
@@ -64,7 +74,8 @@
  * antialiasing (like VTK's own translucent passes it samples once per pixel).
  * Hardware selection is VTK's own.
  *
- * @sa vtkDualDepthPeelingPass vtkOrderIndependentTranslucentPass
+ * @sa vtkCurvatureOpacityProperty vtkCurvatureOpacityPolyDataMapper vtkDualDepthPeelingPass
+ * vtkOrderIndependentTranslucentPass
  */
 #ifndef vtkBucketedKBufferPass_h
 #define vtkBucketedKBufferPass_h
@@ -73,6 +84,8 @@
 #include "vtkOpenGLRenderPass.h"
 
 #include <memory> // for the implementation
+
+class vtkCurvatureOpacityProperty;
 
 class VTKLIGHTTRANSPORTRENDERING_EXPORT vtkBucketedKBufferPass : public vtkOpenGLRenderPass
 {
@@ -124,6 +137,36 @@ public:
 
   ///@{
   /**
+   * How curvature changes colour and opacity, for all mappers but
+   * vtkCurvatureOpacityPolyDataMapper, which have their own. Never nullptr: setting
+   * nullptr makes a default one, which changes nothing.
+   */
+  void SetCurvatureOpacityProperty(vtkCurvatureOpacityProperty* property);
+  vtkCurvatureOpacityProperty* GetCurvatureOpacityProperty();
+  ///@}
+
+  ///@{
+  /**
+   * The length s of kappa = -tanh(s (k1 + k2)), in the world's unit: a sphere of radius
+   * 2 s has kappa = -0.76. Larger values show fainter curvature. 0 (default): from the
+   * scene, a fortieth of the diagonal of what is translucent. Clamped to be >= 0.
+   */
+  vtkSetClampMacro(CurvatureScale, double, 0., VTK_DOUBLE_MAX);
+  vtkGetMacro(CurvatureScale, double);
+  ///@}
+
+  ///@{
+  /**
+   * Search for neighbours among all fragments of a pixel, as if they were one shape:
+   * the brute force of Carnecky et al. 2013, for comparison. Off by default.
+   */
+  vtkSetMacro(SingleBucket, bool);
+  vtkGetMacro(SingleBucket, bool);
+  vtkBooleanMacro(SingleBucket, bool);
+  ///@}
+
+  ///@{
+  /**
    * Draws the translucent props; a vtkTranslucentPass by default, and for nullptr.
    */
   virtual void SetTranslucentPass(vtkRenderPass* pass);
@@ -167,6 +210,8 @@ protected:
   int ColorPrecision = Half;
   vtkTypeInt64 MemoryLimit = vtkTypeInt64(1) << 30;
   vtkTypeInt64 NumberOfFragments = 0;
+  double CurvatureScale = 0.;
+  bool SingleBucket = false;
   int NumberOfBands = 0;
   int NumberOfGeometryPasses = 0;
   bool UsedFallback = false;

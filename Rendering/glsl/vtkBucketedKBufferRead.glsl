@@ -33,3 +33,13 @@ uvec2 ltGetSurface(uint node)
   return texelFetch(ltSurfaces, int(node)).xy;
 }
 #endif
+
+vec3 ltUnpackNormal(uint bits)
+{
+  vec2 e = unpackSnorm2x16(bits);
+  vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+  float t = max(-n.z, 0.0);
+  n.x += n.x >= 0.0 ? -t : t;
+  n.y += n.y >= 0.0 ? -t : t;
+  return normalize(n);
+}

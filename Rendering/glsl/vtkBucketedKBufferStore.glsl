@@ -9,12 +9,21 @@ uniform sampler2D ltOpaqueDepth; // DC, of this viewport
 uniform int ltWidth;             // of the viewport, in pixels
 uniform int ltCapacity;          // of the buffers, in nodes
 uniform int ltClampColor;        // 1: the picture holds colours in [0,1]
-uniform int ltShape;             // style << 24 | the prop's first shape
+uniform int ltStyle;
+uniform int ltShape;             // the prop's first
 uniform int ltThin;              // 1: points or wireframe
 
 // A fragment on an opaque surface is in front of it, as with GL_LEQUAL: half a
 // step of a 24-bit depth buffer.
 const float ltDepthTolerance = 3.0e-8;
+
+#if LT_STYLE
+// From a normal that was turned to the eye.
+uint ltOutwardNormal(vec3 n)
+{
+  return dot(n, n) > 0.0 ? ltPackNormal(gl_FrontFacing ? n : -n) : LT_NO_NORMAL;
+}
+#endif
 
 void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
 {
@@ -33,7 +42,8 @@ void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
   color.rgb = ltClampColor != 0 ? clamp(color.rgb, 0.0, 1.0) : clamp(color.rgb, 0.0, 65504.0);
   ltSetColor(node, color);
 #if LT_STYLE
-  ltSurface[node] = uvec2(uint(ltShape) + shape, normalVC);
+  shape = (uint(ltShape) + shape) & 0xFFFFFFu;
+  ltSurface[node] = uvec2(uint(ltStyle) << 24u | shape, ltThin != 0 ? LT_NO_NORMAL : normalVC);
 #endif
   uint next = atomicExchange(ltHead[p.y * ltWidth + p.x], node);
   ltLink[node] = uvec2(next, floatBitsToUint(depthDC) << 1 | uint(ltThin));

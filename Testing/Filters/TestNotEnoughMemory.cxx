@@ -6,8 +6,10 @@
 #include "vtkFloatArray.h"
 #include "vtkLightDiffusionFilter.h"
 #include "vtkLightSeedFilter.h"
+#include "vtkLightTransportArrays.h"
 #include "vtkOpticalMediumFilter.h"
 #include "vtkSMPTools.h"
+#include "vtkVisibilityFactorFilter.h"
 
 #if defined(__linux__)
 #include <malloc.h>
@@ -90,6 +92,22 @@ int main(int argc, char* argv[])
     refused->SetInputData(large);
     const MemoryLimit limit(n * n * n);
     LT_CHECK_FAILS(suite, refused.Get(), "not enough memory");
+  }
+  {
+    // An order too high for the memory there is, and one that fits.
+    vtkNew<vtkVisibilityFactorFilter> visibility;
+    visibility->SetInputConnection(medium->GetOutputPort());
+    visibility->SetExtinctionArrayName(vtkLightTransportArrays::Absorption);
+    visibility->SetNumberOfDirections(2);
+    visibility->SetOrder(4);
+    visibility->SetResolutionFactor(1);
+    {
+      const MemoryLimit limit(static_cast<std::size_t>(60) * n * n * n);
+      LT_CHECK_FAILS(suite, visibility.Get(), "not enough memory", "Order 4", "lower order");
+    }
+    visibility->SetOrder(0);
+    visibility->Update();
+    LT_CHECK(suite, visibility->GetOutput()->GetNumberOfPoints() == n * n * n);
   }
   filter->Modified();
   filter->Update();

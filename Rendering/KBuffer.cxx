@@ -1,0 +1,646 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "KBuffer.h"
+
+#include "vtkBucketedKBufferBlend.h"
+#include "vtkBucketedKBufferCurvature.h"
+#include "vtkBucketedKBufferExtensions.h"
+#include "vtkBucketedKBufferList.h"
+#include "vtkBucketedKBufferMatch.h"
+#include "vtkBucketedKBufferOrder.h"
+#include "vtkBucketedKBufferPixel.h"
+#include "vtkBucketedKBufferRead.h"
+#include "vtkBucketedKBufferStyle.h"
+#include "vtkCurvatureOpacityFunction.h"
+#include "vtkCurvatureOpacityProperty.h"
+
+#include "vtkBoundingBox.h"
+#include "vtkCamera.h"
+#include "vtkColorTransferFunction.h"
+#include "vtkImageData.h"
+#include "vtkMatrix4x4.h"
+#include "vtkOpenGLFramebufferObject.h"
+#include "vtkOpenGLQuadHelper.h"
+#include "vtkOpenGLRenderWindow.h"
+#include "vtkOpenGLShaderCache.h"
+#include "vtkOpenGLState.h"
+#include "vtkPiecewiseFunction.h"
+#include "vtkProp.h"
+#include "vtkRenderer.h"
+#include "vtkShaderProgram.h"
+#include "vtkTextureObject.h"
+#include "vtkTextureUnitManager.h"
+
+#include <algorithm>
+
+namespace lighttransport
+{
+namespace
+{
+constexpr GLuint EndOfList = 0xFFFFFFFFU;
+} // namespace
+
+//------------------------------------------------------------------------------
+KBuffer::KBuffer() = default;
+KBuffer::~KBuffer() = default;
+
+//------------------------------------------------------------------------------
+std::vector<StorageBuffer*> KBuffer::All()
+{
+  return { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter,
+    &this->Pixels, &this->Records, &this->NodeList, &this->Buckets, &this->Neighbors,
+    &this->Tensors };
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::Release(vtkWindow* window)
+{
+  for (StorageBuffer* buffer : this->All())
+  {
+    buffer->Release();
+  }
+  this->Order.Release();
+  this->Match.Release();
+  this->Tensor.Release();
+  for (auto* texture : { &this->OpaqueDepth, &this->TargetColor, &this->ShadingTable,
+         &this->OpacityTable, &this->ParameterTable })
+  {
+    if (*texture)
+    {
+      (*texture)->ReleaseGraphicsResources(window);
+      *texture = nullptr;
+    }
+  }
+  for (auto* target : { &this->DepthTarget, &this->GeometryTarget })
+  {
+    if (*target)
+    {
+      (*target)->ReleaseGraphicsResources(window);
+      *target = nullptr;
+    }
+  }
+  this->OpaqueDepthFormat = -1;
+  this->Quad.reset();
+  this->QuadKey.clear();
+  this->Tables.clear();
+  this->Capacity = 0;
+  this->LargestBlock = 0;
+  this->Window = nullptr;
+}
+
+//------------------------------------------------------------------------------
+std::string KBuffer::WhyNot()
+{
+  GLint major = 0;
+  GLint minor = 0;
+  glGetIntegerv(GL_MAJOR_VERSION, &major);
+  glGetIntegerv(GL_MINOR_VERSION, &minor);
+  if (10 * major + minor < 43)
+  {
+    return "OpenGL is " + std::to_string(major) + "." + std::to_string(minor) +
+      ", expected 4.3 or later";
+  }
+  if (this->LargestBlock == 0)
+  {
+    GLint64 largest = 0;
+    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
+    GLint texels = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
+    this->LargestBlock = largest;
+    this->MostTexels = texels;
+  }
+  const vtkTypeInt64 most =
+    std::min(this->LargestBlock / (this->Now.style ? 16 : 4), this->MostTexels);
+  if (vtkTypeInt64(this->Now.size[0]) * this->Now.size[1] > most)
+  {
+    return "the viewport has " + std::to_string(this->Now.size[0]) + " x " +
+      std::to_string(this->Now.size[1]) + " pixels, expected at most " + std::to_string(most) +
+      " on this GPU";
+  }
+  return std::string();
+}
+
+//------------------------------------------------------------------------------
+vtkTypeInt64 KBuffer::MostNodes(vtkTypeInt64 memoryLimit) const
+{
+  const int widest = this->Now.floatColor || this->Now.lines ? 16 : 8;
+  const vtkTypeInt64 byBlock = std::min(this->LargestBlock / widest, this->MostTexels);
+  const vtkTypeInt64 byLimit = memoryLimit / (this->BitsPerFragment() / 8);
+  // Node numbers have 26 bits in ltNodes.
+  return std::max<vtkTypeInt64>(1024, std::min(std::min(byBlock, byLimit), vtkTypeInt64(1) << 26));
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::ReserveNodes(vtkTypeInt64 nodes)
+{
+  this->Links.Reserve(nodes * 8);
+  this->Colors.Reserve(nodes * (this->Now.floatColor ? 16 : 8));
+  if (this->Now.style)
+  {
+    this->Surfaces.Reserve(nodes * 8);
+  }
+  this->Capacity = nodes;
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::ReleaseNodes()
+{
+  for (StorageBuffer* buffer : { &this->Links, &this->Colors, &this->Surfaces, &this->Records,
+         &this->NodeList, &this->Buckets, &this->Neighbors, &this->Tensors })
+  {
+    buffer->Release();
+  }
+  this->Capacity = 0;
+}
+
+//------------------------------------------------------------------------------
+int KBuffer::BitsPerFragment() const
+{
+  const int list = 32 + 32 + (this->Now.floatColor ? 128 : 64); // next, depth, colour
+  // shape, normal; then z, normal, node, bucket, neighbours
+  const int style = this->Now.style ? 32 + 32 + 32 + 32 + 32 + 64 + 32 : 0;
+  return list + style + (this->Now.lines ? 128 : 0);
+}
+
+//------------------------------------------------------------------------------
+vtkTypeInt64 KBuffer::Bytes()
+{
+  vtkTypeInt64 bytes = 0;
+  for (const StorageBuffer* buffer : this->All())
+  {
+    bytes += buffer->Bytes;
+  }
+  return bytes;
+}
+
+//------------------------------------------------------------------------------
+std::string KBuffer::Defines(int room) const
+{
+  return std::string("#define LT_NONE 0xFFFFFFFFu\n#define LT_NO_NORMAL 0x80008000u\n") +
+    define("LT_STYLE", this->Now.style) + define("LT_FLOAT_COLOR", this->Now.floatColor) +
+    define("LT_LINES", this->Now.lines) + define("LT_ROOM", room);
+}
+
+//------------------------------------------------------------------------------
+int KBuffer::Room() const
+{
+  int room = 8;
+  while (room < this->Now.layers)
+  {
+    room *= 2;
+  }
+  return room;
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::BindForReading(const Uniforms& uniforms)
+{
+  struct Reader
+  {
+    StorageBuffer* buffer;
+    const char* name;
+    GLenum format;
+  };
+  vtkOpenGLState* state = this->Window->GetState();
+  const GLenum color = this->Now.floatColor ? GL_RGBA32F : GL_RGBA16F;
+  for (const Reader& r : { Reader{ &this->Heads, "ltHeads", GL_R32UI },
+         Reader{ &this->Links, "ltLinks", GL_RG32UI }, Reader{ &this->Colors, "ltColors", color },
+         Reader{ &this->Surfaces, "ltSurfaces", GL_RG32UI },
+         Reader{ &this->Pixels, "ltPixels", GL_RGBA32UI },
+         Reader{ &this->Records, "ltRecords", GL_RG32UI },
+         Reader{ &this->NodeList, "ltNodeList", GL_R32UI },
+         Reader{ &this->Buckets, "ltBuckets", GL_RG32UI },
+         Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
+         Reader{ &this->Tensors, "ltTensors", GL_RGBA32UI } })
+  {
+    if (r.buffer->Bytes > 0 && uniforms.Has(r.name))
+    {
+      this->Units.push_back(state->GetTextureUnitManager()->Allocate());
+      r.buffer->BindTexture(state, this->Units.back(), r.format);
+      uniforms.Set(r.name, this->Units.back());
+    }
+  }
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::FreeUnits()
+{
+  vtkOpenGLState* state = this->Window->GetState();
+  for (const int unit : this->Units)
+  {
+    state->vtkglActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
+    glBindTexture(GL_TEXTURE_BUFFER, 0);
+    state->GetTextureUnitManager()->Free(unit);
+  }
+  this->Units.clear();
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::SetGeometry(const Uniforms& uniforms) const
+{
+  uniforms.Set("ltSize", std::array<int, 2>{ this->Now.size[0], this->Now.size[1] });
+  uniforms.Set("ltParallel", this->Parallel);
+  uniforms.Set("ltProjection", this->Projection);
+  uniforms.Set("ltDepthToVC", this->DepthToVC);
+  uniforms.Set("ltFootprint", this->Footprint);
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::CopyTarget()
+{
+  this->CopyDepth();
+  const auto width = static_cast<unsigned int>(this->Now.size[0]);
+  const auto height = static_cast<unsigned int>(this->Now.size[1]);
+  vtkOpenGLState* state = this->Window->GetState();
+  if (!this->TargetColor)
+  {
+    this->TargetColor = vtkSmartPointer<vtkTextureObject>::New();
+    this->TargetColor->SetContext(this->Window);
+    this->TargetColor->Allocate2D(width, height, 4, VTK_UNSIGNED_CHAR);
+  }
+  this->TargetColor->Resize(width, height);
+  if (!this->GeometryTarget)
+  {
+    this->GeometryTarget = vtkSmartPointer<vtkOpenGLFramebufferObject>::New();
+    this->GeometryTarget->SetContext(this->Window);
+    state->PushFramebufferBindings();
+    this->GeometryTarget->Bind();
+    this->GeometryTarget->AddColorAttachment(0, this->TargetColor);
+    state->PopFramebufferBindings();
+  }
+  if (this->Now.into.plain)
+  {
+    this->CopyColor();
+  }
+  this->Heads.Reserve(vtkTypeInt64(width) * height * 4);
+  this->Counter.Reserve(NumberOfCounters * 4);
+  this->Counter.Fill(0, NumberOfCounters * 4, 0);
+  if (this->Now.style)
+  {
+    this->Pixels.Reserve(vtkTypeInt64(width) * height * 16);
+    this->FillTables();
+  }
+}
+
+//------------------------------------------------------------------------------
+/** The depth of what is bound; far away where there is none. */
+void KBuffer::CopyDepth()
+{
+  vtkOpenGLState* state = this->Window->GetState();
+  const int* size = this->Now.size;
+  const int* origin = this->Now.origin;
+  const DepthSource source = DepthSource::Bound();
+  const bool none = source.format < 0;
+  // 24 and 8 bits in one, or depth alone: blits ask for the same format.
+  const int key = none ? 0 : source.format + (source.stencil ? 100 : 0);
+  if (!this->OpaqueDepth || this->OpaqueDepthFormat != key)
+  {
+    this->OpaqueDepth = vtkSmartPointer<vtkTextureObject>::New();
+    this->OpaqueDepth->SetContext(this->Window);
+    if (source.stencil)
+    {
+      this->OpaqueDepth->AllocateDepthStencil(size[0], size[1]);
+    }
+    else
+    {
+      this->OpaqueDepth->AllocateDepth(
+        size[0], size[1], none ? static_cast<int>(vtkTextureObject::Float32) : source.format);
+    }
+    this->OpaqueDepth->SetWrapS(vtkTextureObject::ClampToEdge);
+    this->OpaqueDepth->SetWrapT(vtkTextureObject::ClampToEdge);
+    this->OpaqueDepth->SetMinificationFilter(vtkTextureObject::Nearest);
+    this->OpaqueDepth->SetMagnificationFilter(vtkTextureObject::Nearest);
+    this->OpaqueDepthFormat = key;
+    this->DepthTarget = nullptr;
+  }
+  else
+  {
+    this->OpaqueDepth->Resize(size[0], size[1]);
+  }
+  if (!this->DepthTarget)
+  {
+    state->PushFramebufferBindings();
+    this->DepthTarget = vtkSmartPointer<vtkOpenGLFramebufferObject>::New();
+    this->DepthTarget->SetContext(this->Window);
+    this->DepthTarget->Bind();
+    this->DepthTarget->AddDepthAttachment(this->OpaqueDepth);
+    this->DepthTarget->DeactivateDrawBuffers();
+    this->DepthTarget->DeactivateReadBuffer();
+    state->PopFramebufferBindings();
+  }
+  state->PushFramebufferBindings();
+  this->DepthTarget->Bind(vtkOpenGLFramebufferObject::GetDrawMode());
+  state->vtkglDisable(GL_SCISSOR_TEST);
+  if (none)
+  {
+    state->vtkglDepthMask(GL_TRUE);
+    state->vtkglClearDepth(1.0);
+    state->vtkglClear(GL_DEPTH_BUFFER_BIT);
+  }
+  else
+  {
+    state->vtkglBlitFramebuffer(origin[0], origin[1], origin[0] + size[0], origin[1] + size[1], 0,
+      0, size[0], size[1], GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+  }
+  state->PopFramebufferBindings();
+}
+
+//------------------------------------------------------------------------------
+/** What is in the picture already; the geometry stage writes no colour. */
+void KBuffer::CopyColor()
+{
+  vtkOpenGLState* state = this->Window->GetState();
+  const int* size = this->Now.size;
+  const int* origin = this->Now.origin;
+  state->PushFramebufferBindings();
+  GLint drawBuffer = 0;
+  GLint readBuffer = 0;
+  glGetIntegerv(GL_DRAW_BUFFER0, &drawBuffer);
+  glGetIntegerv(GL_READ_BUFFER, &readBuffer);
+  glReadBuffer(static_cast<GLenum>(drawBuffer));
+  this->GeometryTarget->Bind(vtkOpenGLFramebufferObject::GetDrawMode());
+  this->GeometryTarget->ActivateDrawBuffers(1);
+  state->vtkglDisable(GL_SCISSOR_TEST);
+  state->vtkglColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  state->vtkglBlitFramebuffer(origin[0], origin[1], origin[0] + size[0], origin[1] + size[1], 0, 0,
+    size[0], size[1], GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glReadBuffer(static_cast<GLenum>(readBuffer));
+  state->PopFramebufferBindings();
+}
+
+//------------------------------------------------------------------------------
+/** How z in VC follows from depth, and what the scene measures. */
+void KBuffer::SetCamera(vtkRenderer* renderer, vtkProp** props, int count)
+{
+  vtkCamera* camera = renderer->GetActiveCamera();
+  vtkMatrix4x4* p = camera->GetProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1., 1.);
+  this->Parallel = camera->GetParallelProjection() != 0;
+  const int column = this->Parallel ? 3 : 2;
+  const auto at = [p](int row, int col) { return static_cast<float>(p->GetElement(row, col)); };
+  this->Projection = { at(0, 0), at(1, 1), at(0, column), at(1, column) };
+  this->DepthToVC = { at(2, 2), at(2, 3) };
+  this->Footprint = static_cast<float>(2. / (p->GetElement(1, 1) * this->Now.size[1]));
+  vtkMatrix4x4::Invert(p, this->DCToVC);
+  this->DCToVC->Transpose();
+
+  vtkBoundingBox box;
+  for (int i = 0; i < count; ++i)
+  {
+    const double* bounds = props[i]->GetBounds();
+    if (bounds && bounds[0] <= bounds[1] && props[i]->HasTranslucentPolygonalGeometry())
+    {
+      box.AddBounds(bounds);
+    }
+  }
+  this->DepthRange = { 0.F, 1.F };
+  this->SceneLength = 1.;
+  if (!box.IsValid())
+  {
+    return;
+  }
+  // The distances of the box's corners along the line of sight.
+  const double length = std::max(box.GetDiagonalLength(), 1e-30);
+  double nearest = VTK_DOUBLE_MAX;
+  double farthest = -VTK_DOUBLE_MAX;
+  vtkMatrix4x4* view = camera->GetViewTransformMatrix();
+  for (int corner = 0; corner < 8; ++corner)
+  {
+    double point[4] = { 0., 0., 0., 1. };
+    box.GetCorner(corner, point);
+    point[3] = 1.;
+    view->MultiplyPoint(point, point);
+    nearest = std::min(nearest, -point[2]);
+    farthest = std::max(farthest, -point[2]);
+  }
+  const double widen = farthest - nearest > 1e-6 * length ? 0. : .5 * length;
+  this->DepthRange = { static_cast<float>(nearest - widen), static_cast<float>(farthest + widen) };
+  this->SceneLength = length;
+}
+
+//------------------------------------------------------------------------------
+/** The styles' functions as textures, made again where one has changed. */
+void KBuffer::FillTables()
+{
+  std::vector<std::pair<vtkCurvatureOpacityProperty*, vtkMTimeType>> now;
+  for (const auto& style : this->Styles)
+  {
+    now.emplace_back(style, style->GetMTime());
+  }
+  if (this->ShadingTable && now == this->Tables)
+  {
+    return;
+  }
+  this->Tables = now;
+  constexpr int Shades = 256;
+  constexpr int Opacities = 64;
+  const auto styles = static_cast<unsigned int>(this->Styles.size());
+  std::vector<float> shading;
+  std::vector<float> opacity;
+  std::vector<float> parameters;
+  for (vtkCurvatureOpacityProperty* style : this->Styles)
+  {
+    for (int i = 0; i < Shades; ++i)
+    {
+      const double kappa = -1. + 2. * i / (Shades - 1);
+      const double factor = style->GetShadingFunction()->GetValue(kappa);
+      double rgb[3] = { 1., 1., 1. };
+      if (style->GetShadingColors())
+      {
+        style->GetShadingColors()->GetColor(kappa, rgb);
+      }
+      for (const double c : rgb)
+      {
+        shading.push_back(static_cast<float>(factor * c));
+      }
+      shading.push_back(1.F);
+    }
+    vtkNew<vtkImageData> table;
+    style->GetOpacityFunction()->ExportTable(table, Opacities, Opacities);
+    const auto* values = static_cast<const float*>(table->GetScalarPointer());
+    opacity.insert(opacity.end(), values, values + Opacities * Opacities);
+    const auto row = style->GetParameters();
+    parameters.insert(parameters.end(), row.begin(), row.end());
+  }
+  const auto upload = [this](vtkSmartPointer<vtkTextureObject>& texture, std::vector<float>& values,
+                        unsigned int height, int components, int filter)
+  {
+    const auto width = static_cast<unsigned int>(values.size()) / height / components;
+    texture = vtkSmartPointer<vtkTextureObject>::New();
+    texture->SetContext(this->Window);
+    texture->Create2DFromRaw(width, height, components, VTK_FLOAT, values.data());
+    texture->SetWrapS(vtkTextureObject::ClampToEdge);
+    texture->SetWrapT(vtkTextureObject::ClampToEdge);
+    texture->SetMinificationFilter(filter);
+    texture->SetMagnificationFilter(filter);
+  };
+  upload(this->ShadingTable, shading, styles, 4, vtkTextureObject::Linear);
+  upload(this->OpacityTable, opacity, styles * Opacities, 1, vtkTextureObject::Linear);
+  upload(this->ParameterTable, parameters, styles, 4, vtkTextureObject::Nearest);
+}
+
+//------------------------------------------------------------------------------
+/** For rows low to high - 1: empty lists, and a target for nothing but the lists. */
+void KBuffer::BeginGeometry(int low, int high)
+{
+  vtkOpenGLState* state = this->Window->GetState();
+  const vtkTypeInt64 width = this->Now.size[0];
+  this->Heads.Fill(low * width * 4, (high - low) * width * 4, EndOfList);
+  this->Counter.Fill(4 * NodesAsked, 4, 0);
+  this->Counter.Fill(4 * FragmentsListed, 4, 0);
+  for (StorageBuffer* buffer :
+    { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter })
+  {
+    buffer->Bind();
+  }
+  state->PushFramebufferBindings();
+  this->GeometryTarget->Bind();
+  this->GeometryTarget->ActivateDrawBuffers(1);
+  state->vtkglViewport(0, 0, this->Now.size[0], this->Now.size[1]);
+  state->vtkglEnable(GL_SCISSOR_TEST);
+  state->vtkglScissor(0, low, this->Now.size[0], high - low);
+  state->vtkglDisable(GL_DEPTH_TEST);
+  state->vtkglDisable(GL_BLEND);
+  state->vtkglDepthMask(GL_FALSE);
+  state->vtkglColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  this->OpaqueDepth->Activate();
+}
+
+//------------------------------------------------------------------------------
+vtkTypeInt64 KBuffer::EndGeometry()
+{
+  this->OpaqueDepth->Deactivate();
+  this->Window->GetState()->PopFramebufferBindings();
+  glMemoryBarrier(
+    GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+  return this->Counter.Read(NodesAsked);
+}
+
+//------------------------------------------------------------------------------
+/** For rows low to high - 1; what went wrong, or empty. */
+std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
+{
+  const vtkTypeInt64 listed = std::max<vtkTypeInt64>(nodes, 1);
+  this->Records.Reserve(listed * 8);
+  this->NodeList.Reserve(listed * 4);
+  this->Buckets.Reserve(listed * 8);
+  this->Neighbors.Reserve(listed * 4);
+  this->Window->GetShaderCache()->ReleaseCurrentShader();
+  for (StorageBuffer* buffer : { &this->Pixels, &this->Records, &this->NodeList, &this->Buckets,
+         &this->Neighbors, &this->Counter })
+  {
+    buffer->Bind();
+  }
+  const std::string head = "#version 430 core\n" + this->Defines(this->Room()) +
+    define("LT_SINGLE_BUCKET", this->Now.singleBucket) + vtkBucketedKBufferRead +
+    vtkBucketedKBufferPixel;
+  const auto run = [&](ComputeProgram& program, const std::string& body)
+  {
+    const std::string problem = program.Use(head + body);
+    if (problem.empty())
+    {
+      const Uniforms uniforms(program);
+      this->BindForReading(uniforms);
+      this->SetGeometry(uniforms);
+      uniforms.Set("ltFirstRow", low);
+      uniforms.Set("ltLastRow", high);
+      uniforms.Set("ltLayers", this->Now.layers);
+      glDispatchCompute(
+        static_cast<GLuint>((this->Now.size[0] + 63) / 64), static_cast<GLuint>(high - low), 1);
+      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
+        GL_BUFFER_UPDATE_BARRIER_BIT);
+      this->FreeUnits();
+    }
+    glUseProgram(0);
+    return problem;
+  };
+  const std::string problem =
+    run(this->Order, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
+  return problem.empty() ? run(this->Match, vtkBucketedKBufferMatch) : problem;
+}
+
+//------------------------------------------------------------------------------
+/** Rows first to last - 1 of the picture; false where the shader was not built. */
+bool KBuffer::Blend(int first, int last)
+{
+  vtkOpenGLState* state = this->Window->GetState();
+  const int* size = this->Now.size;
+  const int* origin = this->Now.origin;
+  this->Counter.Bind();
+  const std::string key = this->Defines(this->Room()) +
+    define("LT_READ_TARGET", this->Now.into.plain) + define("LT_CLAMP", this->Now.into.clamps);
+  if (!this->Quad || this->QuadKey != key)
+  {
+    const std::string body = this->Now.style
+      ? std::string(vtkBucketedKBufferPixel) + vtkBucketedKBufferCurvature + vtkBucketedKBufferStyle
+      : std::string(vtkBucketedKBufferList) + vtkBucketedKBufferBlend;
+    const std::string source = std::string("//VTK::System::Dec\n") + vtkBucketedKBufferExtensions +
+      "//VTK::Output::Dec\n" + key + vtkBucketedKBufferRead + body;
+    this->Quad =
+      std::make_unique<vtkOpenGLQuadHelper>(this->Window, nullptr, source.c_str(), nullptr);
+    this->QuadKey = key;
+  }
+  else
+  {
+    this->Window->GetShaderCache()->ReadyShaderProgram(this->Quad->Program);
+  }
+  vtkShaderProgram* program = this->Quad->Program;
+  if (!program)
+  {
+    return false;
+  }
+  state->vtkglViewport(origin[0], origin[1], size[0], size[1]);
+  state->vtkglEnable(GL_SCISSOR_TEST);
+  state->vtkglScissor(origin[0], origin[1] + first, size[0], last - first);
+  state->vtkglDisable(GL_CULL_FACE);
+  state->vtkglColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  state->vtkglBlendFuncSeparate(GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+
+  const Uniforms uniforms(program);
+  std::vector<vtkTextureObject*> textures;
+  const auto activate = [&](const char* name, vtkTextureObject* texture)
+  {
+    texture->Activate();
+    uniforms.Set(name, texture->GetTextureUnit());
+    textures.push_back(texture);
+  };
+  if (this->Now.into.plain)
+  {
+    // Blending in 8 bits would round more than once.
+    state->vtkglDisable(GL_BLEND);
+    activate("ltTarget", this->TargetColor);
+  }
+  else
+  {
+    state->vtkglEnable(GL_BLEND);
+  }
+  this->BindForReading(uniforms);
+  this->SetGeometry(uniforms);
+  uniforms.Set("ltLayers", this->Now.layers);
+  if (this->Now.style)
+  {
+    uniforms.Set("ltCurvatureScale", static_cast<float>(this->Now.curvatureScale));
+    uniforms.Set("ltDepthRange", this->DepthRange);
+    uniforms.Set("ltStyles", static_cast<int>(this->Styles.size()));
+    activate("ltShading", this->ShadingTable);
+    activate("ltOpacity", this->OpacityTable);
+    activate("ltParameters", this->ParameterTable);
+  }
+  this->Quad->Render();
+  for (vtkTextureObject* texture : textures)
+  {
+    texture->Deactivate();
+  }
+  this->FreeUnits();
+  return true;
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::Unbind()
+{
+  for (StorageBuffer* buffer : this->All())
+  {
+    buffer->Unbind();
+  }
+  glBindBuffer(GL_SHADER_STORAGE_BUFFER, 0);
+}
+} // namespace lighttransport

@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * Private to vtkBucketedKBufferPass: the buffers, textures and programs of a k-buffer
+ * in one window, and the stages that touch nothing but these.
+ */
+#ifndef KBuffer_h
+#define KBuffer_h
+
+#include "KBufferResources.h"
+
+#include "vtkNew.h"
+#include "vtkSmartPointer.h"
+#include "vtkWeakPointer.h"
+
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+class vtkCurvatureOpacityProperty;
+class vtkMatrix4x4;
+class vtkOpenGLFramebufferObject;
+class vtkOpenGLQuadHelper;
+class vtkOpenGLRenderWindow;
+class vtkProp;
+class vtkRenderer;
+class vtkTextureObject;
+class vtkWindow;
+
+namespace lighttransport
+{
+class KBuffer
+{
+public:
+  enum Counters
+  {
+    NodesAsked = 0,
+    FragmentsListed = 1,
+    FragmentsMerged = 2,
+    NumberOfCounters = 4
+  };
+
+  /** What a frame is drawn with; set before the stages. */
+  struct Settings
+  {
+    int size[2] = { 0, 0 };   // of the viewport, in pixels
+    int origin[2] = { 0, 0 }; // in the window
+    int layers = 16;
+    bool style = false;
+    bool lines = false;
+    bool floatColor = false;
+    bool singleBucket = false;
+    PictureTarget into;
+    double curvatureScale = 1.;
+  };
+
+  KBuffer();
+  ~KBuffer();
+  KBuffer(const KBuffer&) = delete;
+  KBuffer& operator=(const KBuffer&) = delete;
+
+  Settings Now;
+  std::vector<vtkSmartPointer<vtkCurvatureOpacityProperty>> Styles; // 0: the pass's
+  vtkWeakPointer<vtkOpenGLRenderWindow> Window;
+
+  void Release(vtkWindow* window);
+
+  /** Why this window cannot be drawn to; empty if it can. */
+  std::string WhyNot();
+
+  /** Most nodes that fit into a buffer and into so many bytes. */
+  vtkTypeInt64 MostNodes(vtkTypeInt64 memoryLimit) const;
+  void ReserveNodes(vtkTypeInt64 nodes);
+  void ReleaseNodes();
+  vtkTypeInt64 Capacity = 0; // nodes
+
+  int BitsPerFragment() const;
+  vtkTypeInt64 Bytes();
+
+  /** The lines that the shaders share. */
+  std::string Defines(int room) const;
+
+  // Stages; see vtkBucketedKBufferPass.h.
+  void CopyTarget(); // 1: depth and colour of what is bound
+  void SetCamera(vtkRenderer* renderer, vtkProp** props, int count);
+  double SceneLength = 1.;               // diagonal of what is translucent
+  void BeginGeometry(int low, int high); // 2: clears, binds
+  vtkTypeInt64 EndGeometry();            // how many nodes were asked for
+  std::string OrderAndMatch(int low, int high, vtkTypeInt64 nodes); // 3, 4
+  bool Blend(int first, int last);                                  // 5
+  void Unbind();
+  StorageBuffer Counter{ 4 };
+
+  vtkSmartPointer<vtkTextureObject> OpaqueDepth;
+  vtkNew<vtkMatrix4x4> DCToVC; // transposed
+
+private:
+  StorageBuffer Heads{ 0 };
+  StorageBuffer Links{ 1 };
+  StorageBuffer Colors{ 2 };
+  StorageBuffer Surfaces{ 3 };
+  // with stylisation; bound as in vtkBucketedKBufferOrder.glsl
+  StorageBuffer Pixels{ 5 };
+  StorageBuffer Records{ 6 };
+  StorageBuffer NodeList{ 7 };
+  StorageBuffer Buckets{ 0 };
+  StorageBuffer Neighbors{ 1 };
+  StorageBuffer Tensors{ 2 };
+  ComputeProgram Order;
+  ComputeProgram Match;
+  ComputeProgram Tensor;
+  int OpaqueDepthFormat = -1;
+  vtkSmartPointer<vtkOpenGLFramebufferObject> DepthTarget;
+  vtkSmartPointer<vtkTextureObject> TargetColor;
+  vtkSmartPointer<vtkOpenGLFramebufferObject> GeometryTarget;
+  std::unique_ptr<vtkOpenGLQuadHelper> Quad;
+  std::string QuadKey;
+  vtkSmartPointer<vtkTextureObject> ShadingTable;
+  vtkSmartPointer<vtkTextureObject> OpacityTable;
+  vtkSmartPointer<vtkTextureObject> ParameterTable;
+  std::vector<std::pair<vtkCurvatureOpacityProperty*, vtkMTimeType>> Tables; // what is in them
+  std::vector<int> Units;                                                    // texture units in use
+  vtkTypeInt64 LargestBlock = 0; // GL_MAX_SHADER_STORAGE_BLOCK_SIZE
+  vtkTypeInt64 MostTexels = 0;   // GL_MAX_TEXTURE_BUFFER_SIZE
+
+  // the camera, see vtkBucketedKBufferPixel.glsl
+  int Parallel = 0;
+  std::array<float, 4> Projection{};
+  std::array<float, 2> DepthToVC{};
+  std::array<float, 2> DepthRange{};
+  float Footprint = 1.F;
+
+  std::vector<StorageBuffer*> All();
+  int Room() const;
+  void CopyDepth();
+  void CopyColor();
+  void FillTables();
+  void BindForReading(const Uniforms& uniforms);
+  void FreeUnits();
+  void SetGeometry(const Uniforms& uniforms) const;
+};
+} // namespace lighttransport
+
+#endif

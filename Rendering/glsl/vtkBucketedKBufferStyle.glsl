@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// vtkBucketedKBufferPass, blending stage with stylisation: the fragment shader of a
+// quad over the viewport. Defined before: vtkBucketedKBufferCurvature.glsl, LT_ROOM, LT_LINES (1:
+// vtkBucketedKBufferLines.glsl too), LT_CLAMP (1: colours end at 1).
+
+in vec2 texCoord;
+#if LT_READ_TARGET
+uniform sampler2D ltTarget; // what is behind, premultiplied; else blended by the machine
+#endif
+uniform float ltCurvatureScale; // s, a length
+uniform vec2 ltDepthRange;      // of the function's z: distances of 0 and of 1
+uniform sampler2D ltShading;    // factor of the colour over kappa in [-1,1]; row: style
+uniform sampler2D ltOpacity;    // over |kappa| and z; a block of rows per style
+uniform sampler2D ltParameters; // row: style; see vtkBucketedKBufferPass
+uniform int ltStyles;
+
+int ltPlaceOfRank[LT_ROOM];
+
+// -1 convex, 0 flat, 1 concave; a missing neighbour is -1, a contour.
+float ltKappa(bool complete, float trace)
+{
+  return complete ? -tanh(clamp(ltCurvatureScale * trace, -10.0, 10.0)) : -1.0;
+}
+
+float ltDepthOf(float z)
+{
+  return clamp((-z - ltDepthRange.x) / (ltDepthRange.y - ltDepthRange.x), 0.0, 1.0);
+}
+
+// Radiance scaling of Vergne et al. 2010 (their equation of sigma): delta is the
+// reflectance of a light at the eye, n . v; where it is the invariant point nothing
+// changes, above it convex parts become brighter and concave ones darker.
+float ltRadianceScale(float kappa, float delta, float strength)
+{
+  const float alpha0 = 0.2;
+  float e = exp(kappa * strength);
+  return (alpha0 * e + delta * (1.0 - alpha0 * (1.0 + e))) /
+    (alpha0 + delta * (e - alpha0 * (1.0 + e)));
+}
+
+vec4 ltStylise(vec4 color, uint style, ltSurfacePoint s, vec3 w, vec3 t1, vec3 t2, ivec2 p)
+{
+  float row = (float(style) + 0.5) / float(ltStyles);
+  vec4 switches = texelFetch(ltParameters, ivec2(0, int(style)), 0);
+  float kappa = ltKappa(s.complete, w.x + w.z);
+  vec3 result = color.rgb;
+  float alpha = color.a;
+  const float last = 255.0 / 256.0;
+  vec3 factor = texture(ltShading, vec2(0.5 / 256.0 + last * (0.5 + 0.5 * kappa), row)).rgb;
+  result *= switches.x > 0.0 ? factor : vec3(1.0);
+  float delta = clamp(abs(dot(s.normal, ltViewVC(s.position))), 0.0, 1.0);
+  result *= switches.z > 0.0 ? ltRadianceScale(kappa, delta, switches.z) : 1.0;
+  vec2 at = vec2(abs(kappa), ltDepthOf(s.position.z)) * 63.0 + 0.5;
+  at = vec2(at.x, 64.0 * float(style) + at.y) / vec2(64.0, 64.0 * float(ltStyles));
+  float opacity = texture(ltOpacity, at).r;
+  alpha = switches.y > 0.0 ? opacity : alpha;
+#if LT_LINES
+  vec4 line = texelFetch(ltParameters, ivec2(2, int(style)), 0);
+  float coverage = ltLineCoverage(s, w, t1, t2, p, style) * line.a;
+  // The line is a layer over this one.
+  float lined = coverage + (1.0 - coverage) * alpha;
+  result = (coverage * line.rgb + (1.0 - coverage) * alpha * result) / max(lined, 1e-6);
+  alpha = lined;
+#endif
+  return vec4(result, alpha);
+}
+
+void main()
+{
+  ivec2 p = ivec2(texCoord * vec2(ltSize));
+  int pixel = p.y * ltSize.x + p.x;
+  uvec4 here = texelFetch(ltPixels, pixel);
+  if (here.y == 0u && here.w == 0u)
+  {
+    discard;
+  }
+  ivec4 firsts;
+  for (int side = 0; side < 4; ++side)
+  {
+    ivec2 q = clamp(p + ltSides[side], ivec2(0), ltSize - 1);
+    firsts[side] = int(texelFetch(ltPixels, q.y * ltSize.x + q.x).x);
+  }
+  int count = int(here.y);
+  for (int i = 0; i < count; ++i)
+  {
+    ltPlaceOfRank[texelFetch(ltNodeList, int(here.x) + i).x >> 26u] = i;
+  }
+  vec3 color = vec3(0.0);
+  float transparency = 1.0;
+  for (int rank = 0; rank < count; ++rank)
+  {
+    uint place = here.x + uint(ltPlaceOfRank[rank]);
+    uint node = texelFetch(ltNodeList, int(place)).x & 0x3FFFFFFu;
+    vec4 c = ltGetColor(node);
+    uvec2 surface = ltGetSurface(node);
+    ltSurfacePoint s = ltPointAt(p, place);
+    vec3 t1;
+    vec3 t2;
+    vec3 w = ltShapeOperator(s, p, place, firsts, t1, t2);
+    vec4 styled = ltStylise(c, surface.x >> 24u, s, w, t1, t2, p);
+    c = surface.y == LT_NO_NORMAL ? c : styled;
+#if LT_CLAMP
+    c.rgb = min(c.rgb, vec3(1.0));
+#endif
+    color += transparency * c.a * c.rgb;
+    transparency *= 1.0 - c.a;
+  }
+  vec4 tail = vec4(unpackHalf2x16(here.z), unpackHalf2x16(here.w));
+  color += transparency * tail.a * tail.rgb;
+  transparency *= 1.0 - tail.a;
+  vec4 result = vec4(color, 1.0 - transparency);
+#if LT_READ_TARGET
+  result += transparency * texelFetch(ltTarget, p, 0);
+#endif
+  gl_FragData[0] = result;
+}

@@ -1,0 +1,621 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vtkLightTransportPolyDataMapper.h"
+
+#include "vtkLightTransportArrays.h"
+#include "vtkLightTransportCompat.h"
+#include "vtkLightTransportPolyDataMapperVisibility.h"
+#include "vtkVisibilityFactorFilter.h"
+
+#include "vtkActor.h"
+#include "vtkAlgorithm.h"
+#include "vtkAlgorithmOutput.h"
+#include "vtkCamera.h"
+#include "vtkCommand.h"
+#include "vtkDataArray.h"
+#include "vtkExecutive.h"
+#include "vtkImageData.h"
+#include "vtkLight.h"
+#include "vtkLightCollection.h"
+#include "vtkMath.h"
+#include "vtkMatrix4x4.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkOpenGLHelper.h"
+#include "vtkOpenGLRenderWindow.h"
+#include "vtkPointData.h"
+#include "vtkProp3D.h"
+#include "vtkRenderer.h"
+#include "vtkShaderProgram.h"
+#include "vtkSmartPointer.h"
+#include "vtkTextureObject.h"
+#include "vtkTrivialProducer.h"
+#include "vtkVersion.h"
+
+// GLEW or glad, by VTK's version.
+#include LIGHTTRANSPORT_GL_HEADER
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+vtkStandardNewMacro(vtkLightTransportPolyDataMapper);
+
+namespace
+{
+constexpr int MostExactLights = 4;
+constexpr int MostTextures = 7;
+
+/** The filter's own error, which is told as the mapper's. */
+class Collector : public vtkCommand
+{
+public:
+  static Collector* New() { return new Collector; }
+  void Execute(vtkObject*, unsigned long, void* data) override
+  {
+    this->text = static_cast<const char*>(data);
+  }
+  std::string text;
+};
+
+/** One texture of half floats, linear between its texels; false where the GPU has no room. */
+bool Upload(vtkTextureObject* texture, vtkOpenGLRenderWindow* window, const int n[3],
+  std::vector<float>& rgba)
+{
+  while (glGetError() != GL_NO_ERROR)
+  {
+  }
+  texture->ReleaseGraphicsResources(window);
+  texture->SetContext(window);
+  texture->ResetFormatAndType();
+  texture->SetInternalFormat(GL_RGBA16F);
+  texture->SetWrapS(vtkTextureObject::ClampToEdge);
+  texture->SetWrapT(vtkTextureObject::ClampToEdge);
+  texture->SetWrapR(vtkTextureObject::ClampToEdge);
+  texture->SetMinificationFilter(vtkTextureObject::Linear);
+  texture->SetMagnificationFilter(vtkTextureObject::Linear);
+  if (!texture->Create3DFromRaw(n[0], n[1], n[2], 4, VTK_FLOAT, rgba.data()) ||
+    glGetError() == GL_OUT_OF_MEMORY)
+  {
+    texture->ReleaseGraphicsResources(window);
+    return false;
+  }
+  return true;
+}
+
+/** Components [first, first + 4) of an array, times a factor each; 0 where there are none. */
+void Gather(vtkDataArray* array, int first, const double factors[4], std::vector<float>& rgba)
+{
+  const vtkIdType points = array->GetNumberOfTuples();
+  const int components = array->GetNumberOfComponents();
+  rgba.assign(4 * static_cast<std::size_t>(points), 0.f);
+  for (vtkIdType i = 0; i < points; ++i)
+  {
+    for (int c = first; c < std::min(first + 4, components); ++c)
+    {
+      const double value = array->GetComponent(i, c);
+      rgba[4 * static_cast<std::size_t>(i) + (c - first)] =
+        std::isfinite(value) ? static_cast<float>(factors[c - first] * value) : 0.f;
+    }
+  }
+}
+} // namespace
+
+//------------------------------------------------------------------------------
+class vtkLightTransportPolyDataMapper::Implementation
+{
+public:
+  vtkSmartPointer<vtkAlgorithm> Producer;
+  int Port = 0;
+  vtkSmartPointer<vtkProp3D> Volume;
+  std::string Reported;
+
+  // The frame's.
+  bool Active = false;
+  int Textures = 0;          // of harmonics
+  std::vector<int> Channels; // of each light that is on: its exact field, or -1
+  int Exact = 0;
+  std::string Defines;
+  std::map<const vtkOpenGLHelper*, std::string> Built; // with which each primitive was
+  vtkNew<vtkMatrix4x4> WorldToGC;
+  vtkNew<vtkMatrix4x4> WorldToDC;
+
+  // Exact fields.
+  vtkNew<vtkImageData> Medium; // the extinction alone
+  vtkSmartPointer<vtkDataArray> Extinction;
+  vtkNew<vtkVisibilityFactorFilter> Filter;
+  std::vector<std::array<double, 4>> FilterLights;
+
+  // On the GPU.
+  vtkNew<vtkTextureObject> Harmonics[MostTextures];
+  vtkNew<vtkTextureObject> ExactTexture;
+  vtkOpenGLRenderWindow* Window = nullptr; // compared, never used
+  vtkSmartPointer<vtkDataArray> UploadedHarmonics;
+  vtkMTimeType UploadedHarmonicsTime = 0;
+  vtkSmartPointer<vtkDataArray> UploadedExact;
+  vtkMTimeType UploadedExactTime = 0;
+  int Uploads = 0;
+
+  Implementation()
+  {
+    this->Filter->SphericalHarmonicsOff();
+    this->Filter->SetInputData(this->Medium);
+  }
+
+  void Release(vtkWindow* window)
+  {
+    for (auto& texture : this->Harmonics)
+    {
+      texture->ReleaseGraphicsResources(window);
+    }
+    this->ExactTexture->ReleaseGraphicsResources(window);
+    this->UploadedHarmonics = nullptr;
+    this->UploadedExact = nullptr;
+    this->Window = nullptr;
+    this->Active = false;
+  }
+
+  void FindLights(vtkRenderer* renderer, bool exact, vtkMatrix4x4* worldToData);
+  std::string UpdateExact(vtkImageData* image);
+  std::string Prepare(vtkRenderer* renderer);
+};
+
+//------------------------------------------------------------------------------
+/** In the order in which VTK numbers them: those that are on. */
+void vtkLightTransportPolyDataMapper::Implementation::FindLights(
+  vtkRenderer* renderer, bool exact, vtkMatrix4x4* worldToData)
+{
+  this->Channels.clear();
+  std::vector<std::array<double, 4>> lights;
+  vtkCollectionSimpleIterator iterator;
+  renderer->GetLights()->InitTraversal(iterator);
+  while (vtkLight* light = renderer->GetLights()->GetNextLight(iterator))
+  {
+    if (!light->GetSwitch())
+    {
+      continue;
+    }
+    this->Channels.push_back(-1);
+    if (!exact || !light->LightTypeIsSceneLight() ||
+      static_cast<int>(lights.size()) == MostExactLights)
+    {
+      continue;
+    }
+    double position[4] = { 0., 0., 0., 1. };
+    double focus[3];
+    light->GetTransformedPosition(position);
+    light->GetTransformedFocalPoint(focus);
+    if (!light->GetPositional())
+    {
+      vtkMath::Subtract(position, focus, position);
+      position[3] = 0.;
+      if (vtkMath::Normalize(position) == 0.)
+      {
+        continue;
+      }
+    }
+    double out[4];
+    worldToData->MultiplyPoint(position, out);
+    this->Channels.back() = static_cast<int>(lights.size());
+    lights.push_back({ { out[0], out[1], out[2], position[3] } });
+  }
+  this->Exact = static_cast<int>(lights.size());
+  if (lights == this->FilterLights)
+  {
+    return;
+  }
+  // The filter keeps the fields of the lights that stay.
+  if (lights.size() != this->FilterLights.size())
+  {
+    this->Filter->RemoveAllLights();
+    for (std::size_t i = 0; i < lights.size(); ++i)
+    {
+      this->Filter->AddDirectionalLight(0., 0., 1.);
+    }
+  }
+  for (int i = 0; i < this->Exact; ++i)
+  {
+    const std::array<double, 4>& l = lights[i];
+    l[3] != 0. ? this->Filter->SetLightPosition(i, l[0], l[1], l[2])
+               : this->Filter->SetLightDirection(i, l[0], l[1], l[2]);
+  }
+  this->FilterLights = lights;
+}
+
+//------------------------------------------------------------------------------
+std::string vtkLightTransportPolyDataMapper::Implementation::UpdateExact(vtkImageData* image)
+{
+  vtkDataArray* extinction = image->GetPointData()->GetArray(vtkLightTransportArrays::Extinction);
+  if (extinction != this->Extinction || image->GetMTime() > this->Medium->GetMTime())
+  {
+    this->Medium->Initialize();
+    this->Medium->CopyStructure(image);
+    this->Medium->GetPointData()->AddArray(extinction);
+    this->Extinction = extinction;
+  }
+  vtkNew<Collector> collector;
+  vtkNew<Collector> silent; // the executive's own
+  const unsigned long own = this->Filter->AddObserver(vtkCommand::ErrorEvent, collector);
+  const unsigned long other =
+    this->Filter->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, silent);
+  this->Filter->Update();
+  this->Filter->RemoveObserver(own);
+  this->Filter->GetExecutive()->RemoveObserver(other);
+  return collector->text;
+}
+
+//------------------------------------------------------------------------------
+std::string vtkLightTransportPolyDataMapper::Implementation::Prepare(vtkRenderer* renderer)
+{
+  auto* window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow());
+  if (this->Window != window)
+  {
+    this->Release(this->Window);
+    this->Window = window;
+  }
+  this->Producer->Update(this->Port);
+  auto* image = vtkImageData::SafeDownCast(this->Producer->GetOutputDataObject(this->Port));
+  if (!image || image->GetNumberOfPoints() < 1)
+  {
+    return "the visibility of " + std::string(this->Producer->GetClassName()) +
+      " is empty, expected an image of a vtkVisibilityFactorFilter";
+  }
+  const auto arrayOf = [image](const char* name)
+  {
+    vtkDataArray* array = image->GetPointData()->GetArray(name);
+    return array && array->GetNumberOfTuples() == image->GetNumberOfPoints() ? array : nullptr;
+  };
+  vtkDataArray* harmonics = arrayOf(vtkLightTransportArrays::VisibilitySH);
+  vtkDataArray* extinction = arrayOf(vtkLightTransportArrays::Extinction);
+  if (!harmonics && !extinction)
+  {
+    return std::string("the visibility has neither of the point arrays \"") +
+      vtkLightTransportArrays::VisibilitySH + "\" and \"" + vtkLightTransportArrays::Extinction +
+      "\", expected one of them, as vtkVisibilityFactorFilter gives them";
+  }
+  int order = 0;
+  if (harmonics)
+  {
+    const int components = harmonics->GetNumberOfComponents();
+    order = static_cast<int>(std::lround(std::sqrt(static_cast<double>(components)))) - 1;
+    if ((order + 1) * (order + 1) != components || order > 4)
+    {
+      return std::string("the array \"") + vtkLightTransportArrays::VisibilitySH + "\" has " +
+        std::to_string(components) + " components, expected 1, 4, 9, 16 or 25";
+    }
+  }
+  if (extinction && extinction->GetNumberOfComponents() != 1)
+  {
+    return std::string("the array \"") + vtkLightTransportArrays::Extinction + "\" has " +
+      std::to_string(extinction->GetNumberOfComponents()) + " components, expected 1";
+  }
+  int n[3];
+  image->GetDimensions(n);
+  const int limit = vtkTextureObject::GetMaximumTextureSize3D(window);
+  if (limit > 0 && *std::max_element(n, n + 3) > limit)
+  {
+    return "the visibility has " + std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " +
+      std::to_string(n[2]) + " points, expected at most " + std::to_string(limit) +
+      " along each axis, the limit of this GPU's 3-D textures";
+  }
+
+  // Places and directions.
+  vtkNew<vtkMatrix4x4> worldToData;
+  if (this->Volume)
+  {
+    vtkMatrix4x4::Invert(this->Volume->GetMatrix(), worldToData);
+  }
+  vtkNew<vtkMatrix4x4> indexToGC;
+  const int* extent = image->GetExtent();
+  for (int a = 0; a < 3; ++a)
+  {
+    indexToGC->SetElement(a, a, 1. / n[a]);
+    indexToGC->SetElement(a, 3, (0.5 - extent[2 * a]) / n[a]);
+  }
+  vtkNew<vtkMatrix4x4> dataToGC;
+  vtkMatrix4x4::Multiply4x4(indexToGC, image->GetPhysicalToIndexMatrix(), dataToGC);
+  vtkMatrix4x4::Multiply4x4(dataToGC, worldToData, this->WorldToGC);
+  this->WorldToDC->DeepCopy(worldToData);
+
+  // Textures.
+  window->MakeCurrent();
+  std::vector<float> rgba;
+  this->Textures = harmonics ? (harmonics->GetNumberOfComponents() + 3) / 4 : 0;
+  if (harmonics &&
+    (this->UploadedHarmonics != harmonics || this->UploadedHarmonicsTime != harmonics->GetMTime()))
+  {
+    double window5[5];
+    vtkVisibilityFactorFilter::GetWindow(order, window5);
+    ++this->Uploads;
+    for (int t = 0; t < this->Textures; ++t)
+    {
+      double factors[4];
+      for (int c = 0; c < 4; ++c)
+      {
+        const int band = static_cast<int>(std::sqrt(4. * t + c + 0.5));
+        factors[c] = band < 5 ? window5[band] : 0.;
+      }
+      Gather(harmonics, 4 * t, factors, rgba);
+      if (!Upload(this->Harmonics[t], window, n, rgba))
+      {
+        return "the GPU has no room for the harmonics of " + std::to_string(n[0]) + " x " +
+          std::to_string(n[1]) + " x " + std::to_string(n[2]) +
+          " points; take a larger ResolutionFactor or a lower order";
+      }
+    }
+    this->UploadedHarmonics = harmonics;
+    this->UploadedHarmonicsTime = harmonics->GetMTime();
+  }
+  this->FindLights(renderer, extinction != nullptr, worldToData);
+  if (this->Exact > 0)
+  {
+    const std::string problem = this->UpdateExact(image);
+    if (!problem.empty())
+    {
+      return "the visibility of the lights could not be computed: " + problem;
+    }
+    vtkDataArray* exact =
+      this->Filter->GetOutput()->GetPointData()->GetArray(vtkLightTransportArrays::Visibility);
+    if (this->UploadedExact != exact || this->UploadedExactTime != exact->GetMTime())
+    {
+      const double factors[4] = { 1., 1., 1., 1. };
+      Gather(exact, 0, factors, rgba);
+      ++this->Uploads;
+      if (!Upload(this->ExactTexture, window, n, rgba))
+      {
+        return "the GPU has no room for the visibility of " + std::to_string(n[0]) + " x " +
+          std::to_string(n[1]) + " x " + std::to_string(n[2]) +
+          " points; take a larger ResolutionFactor";
+      }
+      this->UploadedExact = exact;
+      this->UploadedExactTime = exact->GetMTime();
+    }
+  }
+
+  std::ostringstream defines;
+  defines << "#define LT_HARMONICS " << this->Textures << "\n#define LT_EXACT " << this->Exact
+          << "\n//";
+  for (int channel : this->Channels)
+  {
+    defines << " " << channel; // another shader for another choice of channels
+  }
+  this->Defines = defines.str() + "\n";
+  return {};
+}
+
+//------------------------------------------------------------------------------
+vtkLightTransportPolyDataMapper::vtkLightTransportPolyDataMapper()
+  : Internal(new Implementation)
+{
+}
+
+//------------------------------------------------------------------------------
+vtkLightTransportPolyDataMapper::~vtkLightTransportPolyDataMapper() = default;
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::SetVisibilityConnection(vtkAlgorithmOutput* output)
+{
+  this->Internal->Producer = output ? output->GetProducer() : nullptr;
+  this->Internal->Port = output ? output->GetIndex() : 0;
+  this->Internal->Reported.clear();
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::SetVisibilityData(vtkImageData* image)
+{
+  if (!image)
+  {
+    this->SetVisibilityConnection(nullptr);
+    return;
+  }
+  vtkNew<vtkTrivialProducer> producer;
+  producer->SetOutput(image);
+  this->SetVisibilityConnection(producer->GetOutputPort());
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::SetVolume(vtkProp3D* volume)
+{
+  this->Internal->Volume = volume;
+}
+
+//------------------------------------------------------------------------------
+vtkProp3D* vtkLightTransportPolyDataMapper::GetVolume()
+{
+  return this->Internal->Volume;
+}
+
+//------------------------------------------------------------------------------
+int vtkLightTransportPolyDataMapper::GetNumberOfVisibilityUploads()
+{
+  return this->Internal->Uploads;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::ReportOnce(const std::string& problem)
+{
+  if (this->Internal->Reported != problem)
+  {
+    this->Internal->Reported = problem;
+    if (!problem.empty())
+    {
+      vtkErrorMacro(<< problem << "; the surface is drawn without the volume's shadows.");
+    }
+  }
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::RenderPieceStart(vtkRenderer* renderer, vtkActor* actor)
+{
+  Implementation& internal = *this->Internal;
+  internal.Active = false;
+  if (internal.Producer && (this->ShadowStrength > 0. || this->AmbientOcclusion > 0.))
+  {
+    const std::string problem = internal.Prepare(renderer);
+    this->ReportOnce(problem);
+    internal.Active = problem.empty();
+  }
+  if (!internal.Active)
+  {
+    internal.Defines.clear();
+  }
+  else
+  {
+    for (int t = 0; t < internal.Textures; ++t)
+    {
+      internal.Harmonics[t]->Activate();
+    }
+    if (internal.Exact > 0)
+    {
+      internal.ExactTexture->Activate();
+    }
+  }
+  this->Superclass::RenderPieceStart(renderer, actor);
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::RenderPieceFinish(vtkRenderer* renderer, vtkActor* actor)
+{
+  this->Superclass::RenderPieceFinish(renderer, actor);
+  Implementation& internal = *this->Internal;
+  if (internal.Active)
+  {
+    for (int t = 0; t < internal.Textures; ++t)
+    {
+      internal.Harmonics[t]->Deactivate();
+    }
+    if (internal.Exact > 0)
+    {
+      internal.ExactTexture->Deactivate();
+    }
+  }
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::ReleaseGraphicsResources(vtkWindow* window)
+{
+  this->Internal->Release(window);
+  this->Internal->Built.clear();
+  this->Superclass::ReleaseGraphicsResources(window);
+}
+
+//------------------------------------------------------------------------------
+bool vtkLightTransportPolyDataMapper::GetNeedToRebuildShaders(
+  vtkOpenGLHelper& primitive, vtkRenderer* renderer, vtkActor* actor)
+{
+  // First the superclass, which also remembers what it saw.
+  const bool needed = this->Superclass::GetNeedToRebuildShaders(primitive, renderer, actor);
+  std::string& built = this->Internal->Built[&primitive];
+  const bool other = built != this->Internal->Defines;
+  built = this->Internal->Defines;
+  return needed || other;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::ReplaceShaderLight(
+  std::map<vtkShader::Type, vtkShader*> shaders, vtkRenderer* renderer, vtkActor* actor)
+{
+  const Implementation& internal = *this->Internal;
+  const int complexity = this->PrimitiveInfo[this->LastBoundBO].LastLightComplexity;
+  const int count = this->PrimitiveInfo[this->LastBoundBO].LastLightCount;
+  if (internal.Active && complexity > 0 && count > 0)
+  {
+    // The colour of each light, under another name, times its visibility. VTK puts its own
+    // lighting in the tag's place.
+    std::ostringstream before;
+    std::ostringstream after;
+    before << "  vec3 ltPlace = vertexVC.xyz + in_ltStrengths.z * normalVCVSOutput;\n"
+              "  ambientColor *= ltOcclusion(ltPlace);\n";
+    for (int i = 0; i < count; ++i)
+    {
+      const int channel =
+        i < static_cast<int>(internal.Channels.size()) ? internal.Channels[i] : -1;
+      const std::string l = "ltL" + std::to_string(i);
+      const std::string direction = "-lightDirectionVC" + std::to_string(i);
+      before << "  vec3 " << l << " = "
+             << (complexity == 1 ? "vec3(0.0, 0.0, 1.0)" : direction.c_str()) << ";\n"
+             << "  float ltReach" << i << " = 1e30;\n";
+      if (complexity == 3)
+      {
+        before << "  if (lightPositional" << i << " != 0)\n  {\n    " << l << " = lightPositionVC"
+               << i << " - ltPlace;\n    ltReach" << i << " = length(" << l << ");\n  }\n";
+      }
+      before << "  vec3 ltColor" << i << " = lightColor" << i
+             << " * ltVisibility(ltPlace, normalize(" << l << "), ltReach" << i << ", " << channel
+             << ");\n#define lightColor" << i << " ltColor" << i << "\n";
+      after << "#undef lightColor" << i << "\n";
+    }
+    std::string source = shaders[vtkShader::Fragment]->GetSource();
+    if (!vtkShaderProgram::Substitute(source, "//VTK::Light::Dec",
+          "//VTK::Light::Dec\n" + internal.Defines + vtkLightTransportPolyDataMapperVisibility) ||
+      !vtkShaderProgram::Substitute(
+        source, "//VTK::Light::Impl", before.str() + "//VTK::Light::Impl\n" + after.str(), false))
+    {
+      this->ReportOnce(std::string("VTK ") + vtkVersion::GetVTKVersion() +
+        " has no tag VTK::Light::Dec or VTK::Light::Impl in its fragment shader");
+    }
+    else
+    {
+      shaders[vtkShader::Fragment]->SetSource(source);
+    }
+  }
+  this->Superclass::ReplaceShaderLight(shaders, renderer, actor);
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::SetMapperShaderParameters(
+  vtkOpenGLHelper& primitive, vtkRenderer* renderer, vtkActor* actor)
+{
+  this->Superclass::SetMapperShaderParameters(primitive, renderer, actor);
+  Implementation& internal = *this->Internal;
+  vtkShaderProgram* program = primitive.Program;
+  if (!internal.Active || !program->IsUniformUsed("in_ltStrengths"))
+  {
+    return;
+  }
+  const float strengths[3] = { static_cast<float>(this->ShadowStrength),
+    static_cast<float>(this->AmbientOcclusion), static_cast<float>(this->SurfaceOffset) };
+  program->SetUniform3f("in_ltStrengths", strengths);
+  vtkNew<vtkMatrix4x4> viewToWorld;
+  vtkMatrix4x4::Invert(renderer->GetActiveCamera()->GetModelViewTransformMatrix(), viewToWorld);
+  const auto matrix = [&](const char* name, vtkMatrix4x4* fromWorld)
+  {
+    if (program->IsUniformUsed(name))
+    {
+      vtkNew<vtkMatrix4x4> fromView;
+      vtkMatrix4x4::Multiply4x4(fromWorld, viewToWorld, fromView);
+      fromView->Transpose(); // OpenGL's columns first
+      program->SetUniformMatrix(name, fromView);
+    }
+  };
+  matrix("in_ltViewToGC", internal.WorldToGC);
+  matrix("in_ltViewToDC", internal.WorldToDC);
+  const auto sampler = [&](const std::string& name, vtkTextureObject* texture)
+  {
+    if (program->IsUniformUsed(name.c_str()))
+    {
+      program->SetUniformi(name.c_str(), texture->GetTextureUnit());
+    }
+  };
+  for (int t = 0; t < internal.Textures; ++t)
+  {
+    sampler("in_ltVisibility" + std::to_string(t), internal.Harmonics[t]);
+  }
+  sampler("in_ltExact", internal.ExactTexture);
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportPolyDataMapper::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Visibility: " << this->Internal->Producer << "\n";
+  os << indent << "Volume: " << this->Internal->Volume << "\n";
+  os << indent << "ShadowStrength: " << this->ShadowStrength << "\n";
+  os << indent << "AmbientOcclusion: " << this->AmbientOcclusion << "\n";
+  os << indent << "SurfaceOffset: " << this->SurfaceOffset << "\n";
+  os << indent << "VisibilityUploads: " << this->Internal->Uploads << "\n";
+}
