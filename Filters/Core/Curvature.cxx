@@ -32,7 +32,7 @@ constexpr double LargestNoise = 1e3;     // of the largest value: nothing is lef
 constexpr double Ridge = 1e-7;           // of the fit around holes
 constexpr int ProgressSteps = 16;
 constexpr std::int64_t MinimumTiles = 64; // enough for many threads
-constexpr int NumberOfNoiseSamples = 1 << 16;
+constexpr int NumberOfNoiseSamples = 1 << 14;
 
 /** Rows are handled in blocks of this many values, which stay in registers. */
 template <class Real>
