@@ -30,37 +30,6 @@ vtkCxxSetObjectMacro(vtkCurvatureOpacityFilter, OpacityFunction, vtkCurvatureOpa
 
 namespace
 {
-constexpr vtkIdType MaximumSamples = 1 << 20;
-
-/** atanh(1/2) over the upper quartile of |k1 + k2| of what is curved; 0 if nothing is. */
-double ChooseScale(vtkDataArray* mean)
-{
-  const vtkIdType size = mean->GetNumberOfTuples();
-  const vtkIdType stride = std::max<vtkIdType>(1, size / MaximumSamples) | 1;
-  std::vector<double> samples;
-  double largest = 0.;
-  for (vtkIdType i = 0; i < size; i += stride)
-  {
-    const double value = 2. * std::abs(mean->GetComponent(i, 0));
-    if (std::isfinite(value) && value > 0.)
-    {
-      samples.push_back(value);
-      largest = std::max(largest, value);
-    }
-  }
-  // What rounding makes of a plane is not curved.
-  samples.erase(std::remove_if(samples.begin(), samples.end(),
-                  [largest](double value) { return value < 1e-6 * largest; }),
-    samples.end());
-  if (samples.empty())
-  {
-    return 0.;
-  }
-  const auto at = samples.begin() + static_cast<std::ptrdiff_t>(0.75 * (samples.size() - 1));
-  std::nth_element(samples.begin(), at, samples.end());
-  return std::atanh(0.5) / *at;
-}
-
 void AddFieldValues(vtkDataSet* data, const char* name, std::initializer_list<double> values)
 {
   vtkNew<vtkDoubleArray> array;
@@ -248,7 +217,9 @@ std::string vtkCurvatureOpacityFilter::Compute(
       q0 = q1 = 0.;
     }
   }
-  const double s = this->CurvatureScale > 0. ? this->CurvatureScale : ChooseScale(mean);
+  const double s = this->CurvatureScale > 0.
+    ? this->CurvatureScale
+    : vtkCurvatureOpacityFunction::ChooseCurvatureScale(mean);
 
   vtkNew<vtkFloatArray> opacity;
   opacity->SetName(vtkLightTransportArrays::Opacity);

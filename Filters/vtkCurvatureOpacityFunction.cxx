@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <vector>
 
 vtkStandardNewMacro(vtkCurvatureOpacityFunction);
 vtkCxxSetObjectMacro(vtkCurvatureOpacityFunction, CurvatureFunction, vtkPiecewiseFunction);
@@ -23,6 +24,8 @@ vtkCxxSetObjectMacro(vtkCurvatureOpacityFunction, TableImage, vtkImageData);
 
 namespace
 {
+constexpr vtkIdType MaximumSamples = 1 << 20;
+
 double Clamp01(double value)
 {
   return std::min(std::max(value, 0.), 1.);
@@ -95,6 +98,35 @@ vtkMTimeType vtkCurvatureOpacityFunction::GetMTime()
 double vtkCurvatureOpacityFunction::Kappa(double k1, double k2, double s)
 {
   return -std::tanh(s * (k1 + k2));
+}
+
+//------------------------------------------------------------------------------
+double vtkCurvatureOpacityFunction::ChooseCurvatureScale(vtkDataArray* mean)
+{
+  const vtkIdType size = mean->GetNumberOfTuples();
+  const vtkIdType stride = std::max<vtkIdType>(1, size / MaximumSamples) | 1;
+  std::vector<double> samples;
+  double largest = 0.;
+  for (vtkIdType i = 0; i < size; i += stride)
+  {
+    const double value = 2. * std::abs(mean->GetComponent(i, 0));
+    if (std::isfinite(value) && value > 0.)
+    {
+      samples.push_back(value);
+      largest = std::max(largest, value);
+    }
+  }
+  // What rounding makes of a plane is not curved.
+  samples.erase(std::remove_if(samples.begin(), samples.end(),
+                  [largest](double value) { return value < 1e-6 * largest; }),
+    samples.end());
+  if (samples.empty())
+  {
+    return 0.;
+  }
+  const auto at = samples.begin() + static_cast<std::ptrdiff_t>(0.75 * (samples.size() - 1));
+  std::nth_element(samples.begin(), at, samples.end());
+  return std::atanh(0.5) / *at;
 }
 
 //------------------------------------------------------------------------------

@@ -49,6 +49,7 @@
 
 #include <string> // for messages
 
+class vtkDataArray;
 class vtkImageData;
 class vtkPiecewiseFunction;
 
@@ -141,6 +142,12 @@ public:
    * k2 have, so the unit does not matter.
    */
   static double Kappa(double k1, double k2, double s);
+
+  /**
+   * The s of which |kappa| is 1/2 at the upper quartile of |k1 + k2| of what is curved
+   * at all, from an array of mean curvatures; 0 where nothing is.
+   */
+  static double ChooseCurvatureScale(vtkDataArray* meanCurvature);
 
   vtkMTimeType GetMTime() override;
 

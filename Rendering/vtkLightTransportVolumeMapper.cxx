@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkLightTransportVolumeMapper.h"
 
+#include "VolumeCurvature.h"
 #include "VolumeLighting.h"
 #include "vtkLightFieldProperty.h"
 #include "vtkLightTransportArrays.h"
@@ -294,6 +295,8 @@ public:
 
   std::string LastProblem;
   std::string LastLightingProblem;
+  VolumeCurvature Curvature;
+  std::string LastCurvatureProblem;
   bool WarnedMultiVolume = false;
   bool WarnedDepthPass = false;
   unsigned short Partitions[3] = { 1, 1, 1 };
@@ -920,6 +923,51 @@ bool vtkLightTransportVolumeMapper::PrepareField(vtkRenderer* renderer)
 }
 
 //------------------------------------------------------------------------------
+void vtkLightTransportVolumeMapper::SetCurvatureProperty(vtkVolumeCurvatureProperty* property)
+{
+  this->Internals->Curvature.Property = property;
+}
+
+//------------------------------------------------------------------------------
+vtkVolumeCurvatureProperty* vtkLightTransportVolumeMapper::GetCurvatureProperty()
+{
+  return this->Internals->Curvature.Property;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportVolumeMapper::SetCurvatureFieldConnection(vtkAlgorithmOutput* output)
+{
+  this->Internals->Curvature.SetFieldConnection(output);
+}
+
+//------------------------------------------------------------------------------
+void vtkLightTransportVolumeMapper::RenderWithCurvature(vtkRenderer* renderer, vtkVolume* volume)
+{
+  vtkInternals& self = *this->Internals;
+  std::string problem;
+  const bool curved =
+    !vtkMultiVolume::SafeDownCast(volume) && self.Curvature.Begin(this, renderer, volume, problem);
+  this->Superclass::GPURender(renderer, volume);
+  if (curved)
+  {
+    self.Curvature.End(volume);
+    const std::string& tag = self.Curvature.FailedTag();
+    problem = tag.empty() ? tag
+                          : "The shader has no " + tag +
+        " (a replacement of the vtkShaderProperty took it away); the volume is drawn without "
+        "curvature.";
+  }
+  if (self.LastCurvatureProblem != problem)
+  {
+    self.LastCurvatureProblem = problem;
+    if (!problem.empty())
+    {
+      vtkErrorMacro(<< problem);
+    }
+  }
+}
+
+//------------------------------------------------------------------------------
 void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* volume)
 {
   vtkInternals& self = *this->Internals;
@@ -953,7 +1001,7 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
   sixLights.Hide();
   if (!self.HasField && !self.HasLighting)
   {
-    this->Superclass::GPURender(renderer, volume);
+    this->RenderWithCurvature(renderer, volume);
     return;
   }
   std::ostringstream head;
@@ -985,7 +1033,7 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
   }
   self.Pass->SetActiveDrawBuffers(buffers);
   keys->Append(vtkOpenGLRenderPass::RenderPasses(), self.Pass);
-  this->Superclass::GPURender(renderer, volume);
+  this->RenderWithCurvature(renderer, volume);
   keys->Remove(vtkOpenGLRenderPass::RenderPasses(), self.Pass);
   if (keys->Length(vtkOpenGLRenderPass::RenderPasses()) == 0)
   {
@@ -1010,6 +1058,7 @@ void vtkLightTransportVolumeMapper::ReleaseGraphicsResources(vtkWindow* window)
 {
   this->Internals->Release(window);
   this->Internals->Lighting.Release(window);
+  this->Internals->Curvature.Release(window);
   this->Superclass::ReleaseGraphicsResources(window);
 }
 

@@ -76,9 +76,14 @@
  * shaded one. Lights are where they are with respect to the world: the volume may
  * move. Picking sees the stock picture.
  *
+ * With a vtkVolumeCurvatureProperty opacity follows curvature and depth, in
+ * composite and isosurface blending, below the light: see there. The shadows are
+ * those of the volume without it.
+ *
  * Not for: solving (see vtkLightDiffusionFilter) and surfaces.
  *
- * @sa vtkLightFieldProperty vtkVolumeLightingProperty vtkLightDiffusionFilter
+ * @sa vtkLightFieldProperty vtkVolumeLightingProperty vtkVolumeCurvatureProperty
+ * @sa vtkLightDiffusionFilter
  * @sa vtkVisibilityFactorFilter vtkLightFieldSlices
  */
 #ifndef vtkLightTransportVolumeMapper_h
@@ -92,6 +97,7 @@
 class vtkAlgorithmOutput;
 class vtkImageData;
 class vtkLightFieldProperty;
+class vtkVolumeCurvatureProperty;
 class vtkVolumeLightingProperty;
 
 class VTKLIGHTTRANSPORTRENDERING_EXPORT vtkLightTransportVolumeMapper
@@ -143,6 +149,19 @@ public:
 
   ///@{
   /**
+   * How opacity follows curvature and depth; nullptr (default): it does not. The
+   * curvature is that of a field with the point array "MeanCurvature", as
+   * vtkVolumeCurvatureFilter makes it of the volume (its own grid, in the volume's
+   * data coordinates, updated by the mapper); without one, the turn of the normal
+   * along the ray.
+   */
+  virtual void SetCurvatureProperty(vtkVolumeCurvatureProperty* property);
+  vtkVolumeCurvatureProperty* GetCurvatureProperty();
+  virtual void SetCurvatureFieldConnection(vtkAlgorithmOutput* output);
+  ///@}
+
+  ///@{
+  /**
    * Fields of at most this many bytes as 32-bit floats are kept so on the GPU,
    * others in 16-bit floats, which hold nine decades below the maximum at 3 digits
    * and draw faster. Default: 0, all in 16 bits. Holds from the next upload on.
@@ -189,6 +208,8 @@ private:
   bool CanBeLit(vtkRenderer* renderer, vtkVolume* volume);
   bool PrepareField(vtkRenderer* renderer);
   void ReportOnce(const std::string& problem);
+  /** As the superclass, opacity following curvature where it is to. */
+  void RenderWithCurvature(vtkRenderer* renderer, vtkVolume* volume);
 
   vtkLightTransportVolumeMapper(const vtkLightTransportVolumeMapper&) = delete;
   void operator=(const vtkLightTransportVolumeMapper&) = delete;

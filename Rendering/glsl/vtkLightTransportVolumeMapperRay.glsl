@@ -3,8 +3,10 @@
 // Class:   vtkLightTransportVolumeMapper    Part: geometry of rays    Stage: fragment
 // Tag:     VTK::ComputeLighting::Dec, before it and before all other parts.
 // Needs:   from VTK's declarations in_textureDatasetMatrix, in_cellToPoint.
-// Defines: ltTCToData; TC are the volume's texture coordinates, as g_dataPos.
+// Defines: ltTCToData, once however often it is included; TC are the volume's texture coordinates, as g_dataPos.
 
+#ifndef LT_RAY
+#define LT_RAY
 // Affine: TC -> coordinates of the data. VTK's TC have half a voxel less at either end for
 // point data; in_cellToPoint (a scale and a shift) undoes that.
 mat4 ltTCToData()
@@ -19,4 +21,5 @@ mat4 ltTCToData()
   pointToCell[3].xyz = -scale * in_cellToPoint[0][3].xyz;
   return in_textureDatasetMatrix[0] * pointToCell;
 }
+#endif
 
