@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkLightDiffusionFilter.h"
 
+#include "Core/Coarse.h"
 #include "Core/Diffusion.h"
 #include "Core/FirstMoment.h"
 #include "Core/Seeds.h"
@@ -118,6 +119,9 @@ struct vtkLightDiffusionFilter::State
 
   lighttransport::DiffusionSolver solver;
   std::unique_ptr<lighttransport::FirstMomentSolver> moment; // where the model is FirstMoment
+  std::unique_ptr<lighttransport::CoarseDiffusion> coarse;   // where the grid is coarser
+  MediumKey coarseKey;
+  int coarseFactor = 0;
   // What the solver looks at again while the key holds, where the arrays themselves do not serve.
   std::vector<std::uint8_t> outside;
   std::vector<double> storedD, storedSigma;
@@ -276,6 +280,7 @@ void vtkLightDiffusionFilter::ClearReport()
   this->ActiveFraction = 1.;
   this->PositivityBound = this->StabilityBound = this->UsedTimeStep = 0.;
   this->ComputedGradientScale = 0.;
+  this->UsedCoarseningFactor = 1;
 }
 
 //------------------------------------------------------------------------------
@@ -362,6 +367,11 @@ bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
     this->ActiveThreshold >= 1.)
   {
     text << "ActiveThreshold is " << this->ActiveThreshold << "; expected a number in (0, 1)";
+  }
+  else if (this->CoarseningFactor != 1 && this->CoarseningFactor != 2 &&
+    this->CoarseningFactor != 4)
+  {
+    text << "CoarseningFactor is " << this->CoarseningFactor << "; expected 1, 2 or 4";
   }
   else if (!std::isfinite(this->TargetError) || this->TargetError < 0. || this->TargetError >= 1.)
   {
@@ -627,8 +637,12 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   key.boundary = this->Boundary;
   key.refractiveIndexRatio = this->RefractiveIndexRatio;
   key.moment = moment;
-  // With a named error the region is the filter's choice too.
-  const bool active = this->Mode == Steady && !anisotropic &&
+  // A named error or a time budget lets the filter choose: cells of two voxels and corrections on
+  // the full grid first, which reach a percent in a fraction of a full solve's time.
+  const bool chosen = this->Mode == Steady && !this->ActiveRegion && this->CoarseningFactor == 1 &&
+    !this->KeepSolutions && (this->TargetError > 0. || this->TimeBudget > 0.);
+  const bool coarse = this->Mode == Steady && (this->CoarseningFactor > 1 || chosen);
+  const bool active = this->Mode == Steady && !coarse &&
     (this->ActiveRegion || this->TargetError > 0. || this->TimeBudget > 0.);
   const auto withMedium = [&](auto&& action) -> DiffusionReport
   {
@@ -655,29 +669,65 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, kept.storedSigma) : nullptr);
   };
   double setupSeconds = 0.;
-  if (!active && (!kept.valid || !(key == kept.key)))
+  const auto setUp = [&](auto& solver)
   {
+    const DiffusionReport report =
+      withMedium([&](const auto& medium) { return solver.setMedium(medium); });
+    setupSeconds += report.seconds;
+    problem = report.reason == lighttransport::StopReason::Converged ? "" : report.message;
+    return problem.empty();
+  };
+  const auto setUpFull = [&]
+  {
+    if (kept.valid && key == kept.key)
+    {
+      return true;
+    }
     kept.valid = false;
     kept.solutions.clear();
-    kept.phi.release();
     kept.moment.reset(
       moment ? new lighttransport::FirstMomentSolver(vtkLightTransportParallelFor()) : nullptr);
-    const DiffusionReport report = withMedium([&](const auto& medium)
-      { return moment ? kept.moment->setMedium(medium) : kept.solver.setMedium(medium); });
-    if (report.reason != lighttransport::StopReason::Converged)
-    {
-      problem = report.message;
-      return false;
-    }
-    setupSeconds = report.seconds;
+    kept.valid = moment ? setUp(*kept.moment) : setUp(kept.solver);
     kept.key = key;
-    kept.valid = true;
+    return kept.valid;
+  };
+  const int factor = chosen ? 2 : this->CoarseningFactor;
+  if (!(coarse && kept.coarse && key == kept.coarseKey) && !(kept.valid && key == kept.key))
+  {
+    kept.phi.release(); // of another medium
   }
-  this->PositivityBound = moment ? 0. : kept.solver.positivityBound();
-  this->StabilityBound = moment ? kept.moment->stabilityBound() : kept.solver.stabilityBound();
+  if (coarse)
+  {
+    if (!kept.coarse || factor != kept.coarseFactor || !(key == kept.coarseKey))
+    {
+      kept.coarse.reset();
+      auto made = std::make_unique<lighttransport::CoarseDiffusion>(vtkLightTransportParallelFor());
+      const DiffusionReport report =
+        withMedium([&](const auto& medium) { return made->setMedium(medium, factor); });
+      if (report.reason != lighttransport::StopReason::Converged)
+      {
+        problem = report.message;
+        return false;
+      }
+      setupSeconds = report.seconds;
+      kept.coarse = std::move(made);
+      kept.coarseKey = key;
+      kept.coarseFactor = factor;
+    }
+  }
+  else if (!active && !setUpFull())
+  {
+    return false;
+  }
+  const bool bounds = !moment && !coarse && !active;
+  this->PositivityBound = bounds ? kept.solver.positivityBound() : 0.;
+  this->StabilityBound = moment ? kept.moment->stabilityBound()
+    : bounds                    ? kept.solver.stabilityBound()
+                                : 0.;
 
   // 3. solve
   lighttransport::Buffer<double> phi;
+  bool started = false; // from the last state
   if (active)
   {
     phi.allocate(size);
@@ -686,6 +736,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   else if (this->Continue && kept.phi.size() == size)
   {
     phi = std::move(kept.phi);
+    started = true;
   }
   else
   {
@@ -751,6 +802,37 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     {
       return kept.solver.stepLocal(
         q, phi.data(), this->NumberOfSteps, this->CourantNumber, control);
+    }
+    if (coarse)
+    {
+      this->UsedCoarseningFactor = factor;
+      DiffusionReport first = kept.coarse->solve(q, phi.data(), control, started && chosen);
+      const bool stuck = first.reason == lighttransport::StopReason::MaxIterations ||
+        first.reason == lighttransport::StopReason::NoSteadyState;
+      const double left = this->TimeBudget > 0. ? this->TimeBudget - first.seconds - setupSeconds
+                                                : std::numeric_limits<double>::max();
+      if (!chosen || !stuck || left < 2. * setupSeconds)
+      {
+        return first;
+      }
+      // Where cells of two voxels do not do, the full grid goes on from what they have reached.
+      this->UsedCoarseningFactor = 1;
+      kept.coarse.reset();
+      if (!setUpFull())
+      {
+        first.reason = lighttransport::StopReason::BadInput;
+        return first;
+      }
+      if (this->TimeBudget > 0.)
+      {
+        control.timeBudget = left;
+      }
+      DiffusionReport full = kept.solver.solveSteady(q, phi.data(), control);
+      full.iterations += first.iterations;
+      full.fineApplications += first.fineApplications;
+      full.seconds += first.seconds;
+      full.bytes = std::max(full.bytes, first.bytes);
+      return full;
     }
     if (active)
     {
@@ -865,6 +947,10 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   output->GetPointData()->AddArray(fluence);
   if (this->ComputeFlux)
   {
+    if (coarse && !setUpFull()) // the faces
+    {
+      return false;
+    }
     const auto write = [&](auto* array)
     {
       array->SetName(names::Flux);
@@ -974,6 +1060,7 @@ void vtkLightDiffusionFilter::WriteReport(vtkImageData* output) const
   number("EscapedPower", this->EscapedPower);
   number("LeakedPower", this->LeakedPower);
   number("ActiveFraction", this->ActiveFraction);
+  number("CoarseningFactor", this->UsedCoarseningFactor);
   number("EstimatedError", this->EstimatedError);
   number("EstimatedErrorL2", this->EstimatedErrorL2);
 }
@@ -1021,6 +1108,8 @@ void vtkLightDiffusionFilter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ActiveRegion: " << this->ActiveRegion << "\n";
   os << indent << "ActiveThreshold: " << this->ActiveThreshold << "\n";
   os << indent << "ActiveFraction: " << this->ActiveFraction << "\n";
+  os << indent << "CoarseningFactor: " << this->CoarseningFactor << "\n";
+  os << indent << "UsedCoarseningFactor: " << this->UsedCoarseningFactor << "\n";
   os << indent << "TargetError: " << this->TargetError << "\n";
   os << indent << "TimeBudget: " << this->TimeBudget << "\n";
   os << indent << "EstimatedError: " << this->EstimatedError << "\n";

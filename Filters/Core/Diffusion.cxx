@@ -742,6 +742,30 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
   CloseIsolated(this->A, NoSink, this->parallelFor);
 }
 
+void DiffusionSolver::setOperator(const Grid& grid, DiffusionOperator&& op, double operatorScale)
+{
+  this->multigrid.release();
+  this->multigridReady = false;
+  this->shift = 0.;
+  this->sinkWithoutShift.release();
+  this->box = grid;
+  this->scale = operatorScale;
+  this->A = std::move(op);
+  this->floatMedium = DiffusionMedium<float>(); // the residual is that of this operator
+  this->doubleMedium = DiffusionMedium<double>();
+  this->boundaryOf(Boundary::ZeroFlux);
+  this->anySink = false;
+  this->everySink = true;
+  for (std::int64_t i = 0; i < this->A.size(); ++i)
+  {
+    const bool sink = this->A.s[i] > NoSink;
+    this->anySink = this->anySink || sink;
+    this->everySink = this->everySink && sink;
+  }
+  this->anyWall = true;
+  CloseIsolated(this->A, NoSink, this->parallelFor);
+}
+
 bool DiffusionSolver::isActive(int d, const int at[3], int step) const
 {
   int other[3] = { at[0], at[1], at[2] };

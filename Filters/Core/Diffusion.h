@@ -208,6 +208,9 @@ public:
   const Grid& grid() const { return this->box; }
 
 private:
+  friend class CoarseDiffusion;
+  /** Takes an operator made elsewhere, divided by operatorScale, for steady solves alone. */
+  void setOperator(const Grid& grid, DiffusionOperator&& op, double operatorScale);
   /** Checks the medium and sets the scale. */
   template <class T>
   DiffusionReport check(const DiffusionMedium<T>& medium);

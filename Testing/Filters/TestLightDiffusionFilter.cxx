@@ -516,6 +516,73 @@ void frugal(Suite& suite)
   LT_CHECK(suite, show->count >= 2);
 }
 
+/** Cells of two and four points, on request or because a named error has it so. */
+void coarser(Suite& suite)
+{
+  auto image = makeImage(40, 33, 30, VTK_UNSIGNED_CHAR, [](int, int, int) { return 0.; });
+  addArray<vtkFloatArray>(image, "DiffusionCoefficient",
+    [](int i, int j, int) { return i == 25 ? 0. : .3 + .2 * std::sin(.5 * i + .3 * j); });
+  addArray<vtkFloatArray>(image, "Absorption", [](int, int, int) { return 0.02; });
+  addArray<vtkFloatArray>(
+    image, "Source", [](int i, int j, int k) { return i == 12 && j == 15 && k == 16 ? 1. : 0.; });
+  vtkNew<Filter> full;
+  full->SetInputData(image);
+  full->ComputeFluxOn();
+  full->Update();
+  vtkNew<Filter> coarse;
+  coarse->SetInputData(image);
+  coarse->ComputeFluxOn();
+  for (const int factor : { 2, 4 })
+  {
+    coarse->SetCoarseningFactor(factor);
+    coarse->Update();
+    LT_CHECK(suite, coarse->GetStopReason() == Filter::Converged);
+    LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == factor);
+    const double most = factor == 2 ? 0.02 : 0.4;
+    LT_CHECK(suite, coarse->GetEstimatedError() > 0. && coarse->GetEstimatedError() < most);
+    for (const int i : { 12, 16, 20, 24 })
+    {
+      LT_CHECK_CLOSE(suite, fluenceAt(coarse, i, 15, 18), fluenceAt(full, i, 15, 18), most);
+    }
+    LT_CHECK(suite, fluenceAt(coarse, 30, 15, 16) < 1e-12); // behind the wall
+    LT_CHECK_CLOSE(suite, coarse->GetAbsorbedPower() + coarse->GetEscapedPower(), 1., most);
+    auto* used =
+      coarse->GetOutput()->GetFieldData()->GetArray("LightDiffusionReport.CoarseningFactor");
+    LT_CHECK(suite, used && used->GetTuple1(0) == factor);
+  }
+  LT_CHECK(suite, coarse->GetOutput()->GetPointData()->GetArray("Flux") != nullptr);
+  coarse->SetCoarseningFactor(3);
+  const std::vector<std::string> errors = errorsOfUpdate(coarse);
+  LT_CHECK(suite,
+    errors.size() == 1 && errors[0].find("CoarseningFactor is 3") != std::string::npos);
+
+  // a named error, and a light that moves
+  coarse->SetCoarseningFactor(1);
+  coarse->SetTargetError(0.01);
+  coarse->ContinueOn();
+  coarse->Update();
+  LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 2);
+  LT_CHECK_CLOSE(suite, fluenceAt(coarse, 20, 15, 18), fluenceAt(full, 20, 15, 18), 0.01);
+  const int cold = coarse->GetNumberOfIterationsUsed();
+  addArray<vtkFloatArray>(
+    image, "Source", [](int i, int j, int k) { return i == 13 && j == 15 && k == 16 ? 1. : 0.; });
+  coarse->Update();
+  full->Update();
+  LT_CHECK(suite, coarse->GetNumberOfIterationsUsed() <= cold);
+  LT_CHECK_CLOSE(suite, fluenceAt(coarse, 20, 15, 18), fluenceAt(full, 20, 15, 18), 0.01);
+  // another medium: nothing of the last one is left
+  addArray<vtkFloatArray>(image, "DiffusionCoefficient", [](int, int, int) { return 0.5; });
+  coarse->Update();
+  full->Update();
+  LT_CHECK_CLOSE(suite, fluenceAt(coarse, 30, 15, 18), fluenceAt(full, 30, 15, 18), 0.01);
+  // what cells of two points cannot reach is gone on with on the full grid
+  coarse->SetTargetError(1e-12);
+  coarse->Update();
+  LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 1);
+  LT_CHECK(suite, coarse->GetStopReason() == Filter::Converged); // to Tolerance
+  LT_CHECK_CLOSE(suite, fluenceAt(coarse, 30, 15, 18), fluenceAt(full, 30, 15, 18), 1e-5);
+}
+
 /** Switching, dimming and turning the sign of a light is a sum, not a solve. */
 void superposition(Suite& suite)
 {
@@ -708,6 +775,7 @@ int main(int argc, char* argv[])
   anisotropicDiffusion(suite);
   progress(suite);
   frugal(suite);
+  coarser(suite);
   superposition(suite);
   badInput(suite);
   return suite.result();
