@@ -1,0 +1,665 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * What a solve that is no better than the scene requires costs, and how wrong it is, through the
+ * filter as a user runs it:
+ *
+ *   bench-frugal [--output FOLDER] [--sections grid,region,warm,target,knobs] [--size 64]
+ *     [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD]
+ *
+ *   target  SetTargetError over all scenes: is the target met, is the estimate near the truth?
+ *   budget  SetTimeBudget over all scenes: a third of the full solve's time
+ *   grid    SetCoarseningFactor over all scenes: the error of a coarser grid
+ *   region  an active region against the full solve: a tube, the aorta of thorax_ct, open matter
+ *   warm    one seed of eight moved in a converged 128^3 field: 20 moves
+ *   knobs   time against error for every knob, on two media
+ *
+ * Prints tables of Markdown and leaves the numbers as CSV in FOLDER. Errors are against a solve on
+ * the full grid to 1e-10 with the result in double: p95 is the 95th percentile of
+ * |phi - phi*| / |phi*| over the voxels within six decades of the largest |phi*|, L2 the relative
+ * Euclidean norm. Times are of the filter's Update(), medians of the repeats.
+ */
+#include "FrugalScenes.h"
+
+#include "vtkLightDiffusionFilter.h"
+#include "vtkLightSeedFilter.h"
+#include "vtkLightTransportArrays.h"
+
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkNew.h"
+#include "vtkObject.h"
+#include "vtkPointData.h"
+#include "vtkSMPTools.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+using namespace frugal;
+
+namespace
+{
+struct Options
+{
+  std::string output = "bench-frugal";
+  std::vector<std::string> sections{ "grid", "region", "warm", "target", "budget", "knobs" };
+  std::string data = "../shared/data";
+  std::string only;
+  int size = 64;
+  int most = 96;
+  int repeat = 5;
+  int threads = 2;
+  bool has(const char* section) const
+  {
+    return std::find(this->sections.begin(), this->sections.end(), section) != this->sections.end();
+  }
+};
+
+double now()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double median(std::vector<double> values)
+{
+  if (values.empty())
+  {
+    return std::nan("");
+  }
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+struct Errors
+{
+  double p95 = std::nan("");
+  double l2 = std::nan("");
+};
+
+vtkDataArray* Fluence(vtkLightDiffusionFilter* filter)
+{
+  return filter->GetOutput()->GetPointData()->GetArray(vtkLightTransportArrays::Fluence);
+}
+
+std::vector<double> Values(vtkLightDiffusionFilter* filter)
+{
+  vtkDataArray* array = Fluence(filter);
+  std::vector<double> values(array ? static_cast<std::size_t>(array->GetNumberOfTuples()) : 0);
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    values[i] = array->GetComponent(static_cast<vtkIdType>(i), 0);
+  }
+  return values;
+}
+
+Errors Compare(vtkLightDiffusionFilter* filter, const std::vector<double>& exact)
+{
+  const std::vector<double> phi = Values(filter);
+  Errors errors;
+  if (phi.size() != exact.size())
+  {
+    return errors;
+  }
+  double largest = 0.;
+  for (const double v : exact)
+  {
+    largest = std::max(largest, std::abs(v));
+  }
+  std::vector<float> ratios;
+  double wrong = 0.;
+  double all = 0.;
+  for (std::size_t i = 0; i < phi.size(); ++i)
+  {
+    const double e = std::abs(phi[i] - exact[i]);
+    const double v = std::abs(exact[i]);
+    wrong += e * e;
+    all += v * v;
+    if (v >= 1e-6 * largest && v > 0.)
+    {
+      ratios.push_back(static_cast<float>(e / v));
+    }
+  }
+  if (!ratios.empty())
+  {
+    auto at = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() * 95 / 100);
+    std::nth_element(ratios.begin(), at, ratios.end());
+    errors.p95 = static_cast<double>(*at);
+  }
+  errors.l2 = all > 0. ? std::sqrt(wrong / all) : std::sqrt(wrong);
+  return errors;
+}
+
+using Setter = std::function<void(vtkLightDiffusionFilter*)>;
+
+struct Run
+{
+  double seconds = 0.;
+  Errors errors;
+  vtkSmartPointer<vtkLightDiffusionFilter> filter;
+};
+
+/** A new filter each time: nothing is kept from the last run. */
+Run Solve(vtkImageData* scene, const Setter& set, int repeat, const std::vector<double>* exact)
+{
+  Run run;
+  std::vector<double> seconds;
+  for (int i = 0; i < repeat; ++i)
+  {
+    run.filter = vtkSmartPointer<vtkLightDiffusionFilter>::New();
+    run.filter->SetInputData(scene);
+    set(run.filter);
+    const double began = now();
+    run.filter->Update();
+    seconds.push_back(now() - began);
+  }
+  run.seconds = median(seconds);
+  if (exact)
+  {
+    run.errors = Compare(run.filter, *exact);
+  }
+  return run;
+}
+
+std::vector<double> Exact(vtkImageData* scene, double* seconds = nullptr)
+{
+  const Run run = Solve(
+    scene,
+    [](vtkLightDiffusionFilter* f)
+    {
+      f->SetTolerance(1e-10);
+      f->SetOutputPrecision(vtkAlgorithm::DOUBLE_PRECISION);
+    },
+    1, nullptr);
+  if (seconds)
+  {
+    *seconds = run.seconds;
+  }
+  return Values(run.filter);
+}
+
+/** Comma-separated values, each line on disk at once. */
+class Table
+{
+public:
+  Table(const Options& options, const char* name, const char* head)
+    : file(options.output + "/" + name + ".csv")
+  {
+    this->file << head << std::endl;
+  }
+  template <class... Values>
+  void add(const Values&... values)
+  {
+    std::ostringstream line;
+    line.precision(9);
+    const char* comma = "";
+    ((line << comma << values, comma = ","), ...);
+    this->file << line.str() << std::endl;
+  }
+
+private:
+  std::ofstream file;
+};
+
+std::vector<Scene> Chosen(const Options& options)
+{
+  std::vector<Scene> chosen;
+  for (Scene& scene : Scenes(options.size, options.most, options.data))
+  {
+    if (scene.name.find(options.only) != std::string::npos)
+    {
+      chosen.push_back(scene);
+    }
+  }
+  return chosen;
+}
+
+std::string Quoted(const std::string& text)
+{
+  return '"' + text + '"';
+}
+
+//------------------------------------------------------------------------------
+void MeasureTargets(const Options& options)
+{
+  Table csv(options, "frugal-target",
+    "scene,target,p95,l2,estimated,estimated_l2,seconds,default_seconds,factor,active,iterations,"
+    "voxels,met,within_3");
+  std::printf("\n## SetTargetError\n\n"
+              "| scene | target | p95 | estimate | L2 | estimate | chosen: grid, region, "
+              "iterations | s | default's s |\n|---|---|---|---|---|---|---|---|---|\n");
+  int all = 0, met = 0, near = 0, scenes = 0, all2 = 0, near2 = 0;
+  for (const Scene& scene : Chosen(options))
+  {
+    const vtkSmartPointer<vtkImageData> image = scene.make();
+    if (!image)
+    {
+      std::printf("| %s | no file | | | | | | | |\n", scene.name.c_str());
+      continue;
+    }
+    ++scenes;
+    const std::vector<double> exact = Exact(image);
+    const Run full = Solve(
+      image, [](vtkLightDiffusionFilter*) {}, 1, nullptr);
+    for (const double target : { .3, .1, .03, .01, .001 })
+    {
+      const Run run = Solve(
+        image, [&](vtkLightDiffusionFilter* f) { f->SetTargetError(target); }, 1, &exact);
+      vtkLightDiffusionFilter* f = run.filter;
+      const double estimate = f->GetEstimatedError();
+      const double estimate2 = f->GetEstimatedErrorL2();
+      const bool hit = run.errors.p95 <= target;
+      const bool close = estimate >= run.errors.p95 / 3. && estimate <= 3. * run.errors.p95;
+      const bool close2 = estimate2 >= run.errors.l2 / 3. && estimate2 <= 3. * run.errors.l2;
+      ++all;
+      met += hit;
+      near += close;
+      near2 += close2;
+      std::printf(
+        "| %s | %g | %.1e%s | %.1e%s | %.1e | %.1e%s | 1/%d, %.0f %%, %d | %.3f | %.3f |\n",
+        scene.name.c_str(), target, run.errors.p95, hit ? "" : " **missed**", estimate,
+        close ? "" : " **off**", run.errors.l2, estimate2, close2 ? "" : " off",
+        f->GetUsedCoarseningFactor(), 100. * f->GetActiveFraction(), f->GetNumberOfIterationsUsed(),
+        run.seconds, full.seconds);
+      csv.add(Quoted(scene.name), target, run.errors.p95, run.errors.l2, estimate, estimate2,
+        run.seconds, full.seconds, f->GetUsedCoarseningFactor(), f->GetActiveFraction(),
+        f->GetNumberOfIterationsUsed(), exact.size(), hit, close);
+      std::fflush(stdout);
+    }
+  }
+  (void)all2;
+  std::printf("\n%d scenes, %d solves: target met in %d (%.1f %%), estimate within a factor 3 of "
+              "the true p95 in %d (%.1f %%), of the true L2 in %d (%.1f %%).\n",
+    scenes, all, met, 100. * met / std::max(1, all), near, 100. * near / std::max(1, all), near2,
+    100. * near2 / std::max(1, all));
+  std::fflush(stdout);
+}
+
+void MeasureBudgets(const Options& options)
+{
+  Table csv(options, "frugal-budget",
+    "scene,budget,seconds,p95,l2,estimated,estimated_l2,factor,active,iterations,voxels,within_3");
+  std::printf("\n## SetTimeBudget\n\n"
+              "| scene | budget, s | s | p95 | estimate | chosen: grid, region, iterations |\n"
+              "|---|---|---|---|---|---|\n");
+  int all = 0, near = 0;
+  for (const Scene& scene : Chosen(options))
+  {
+    const vtkSmartPointer<vtkImageData> image = scene.make();
+    if (!image)
+    {
+      continue;
+    }
+    const std::vector<double> exact = Exact(image);
+    const Run full = Solve(
+      image, [](vtkLightDiffusionFilter*) {}, 1, nullptr);
+    for (const double part : { .15, .4 })
+    {
+      const double budget = part * full.seconds;
+      const Run run = Solve(
+        image, [&](vtkLightDiffusionFilter* f) { f->SetTimeBudget(budget); }, 1, &exact);
+      vtkLightDiffusionFilter* f = run.filter;
+      const double estimate = f->GetEstimatedError();
+      const bool close = estimate >= run.errors.p95 / 3. && estimate <= 3. * run.errors.p95;
+      ++all;
+      near += close;
+      std::printf("| %s | %.3f | %.3f | %.1e | %.1e%s | 1/%d, %.0f %%, %d |\n", scene.name.c_str(),
+        budget, run.seconds, run.errors.p95, estimate, close ? "" : " **off**",
+        f->GetUsedCoarseningFactor(), 100. * f->GetActiveFraction(),
+        f->GetNumberOfIterationsUsed());
+      csv.add(Quoted(scene.name), budget, run.seconds, run.errors.p95, run.errors.l2, estimate,
+        f->GetEstimatedErrorL2(), f->GetUsedCoarseningFactor(), f->GetActiveFraction(),
+        f->GetNumberOfIterationsUsed(), exact.size(), close);
+    }
+    std::fflush(stdout);
+  }
+  std::printf("\nThe estimate is within a factor 3 in %d of %d.\n", near, all);
+  std::fflush(stdout);
+}
+
+//------------------------------------------------------------------------------
+void MeasureGrids(const Options& options)
+{
+  Table csv(options, "frugal-grid", "scene,factor,seconds,p95,l2,estimated,bytes_per_voxel,voxels");
+  std::printf("\n## SetCoarseningFactor\n\n"
+              "| scene | s: 1, 2, 4 | p95: 2, 4 | estimated | L2: 2, 4 | bytes / voxel: 1, 2, 4 |\n"
+              "|---|---|---|---|---|---|\n");
+  for (const Scene& scene : Chosen(options))
+  {
+    const vtkSmartPointer<vtkImageData> image = scene.make();
+    if (!image)
+    {
+      continue;
+    }
+    const std::vector<double> exact = Exact(image);
+    const double voxels = static_cast<double>(exact.size());
+    Run runs[3];
+    for (int i = 0; i < 3; ++i)
+    {
+      const int factor = 1 << i;
+      runs[i] = Solve(
+        image, [&](vtkLightDiffusionFilter* f) { f->SetCoarseningFactor(factor); }, options.repeat,
+        &exact);
+      csv.add(Quoted(scene.name), factor, runs[i].seconds, runs[i].errors.p95, runs[i].errors.l2,
+        runs[i].filter->GetEstimatedError(),
+        static_cast<double>(runs[i].filter->GetBytes()) / voxels, exact.size());
+    }
+    std::printf(
+      "| %s | %.3f, %.3f, %.3f | %.2g, %.2g | %.2g, %.2g | %.2g, %.2g | %.0f, %.0f, %.0f |\n",
+      scene.name.c_str(), runs[0].seconds, runs[1].seconds, runs[2].seconds, runs[1].errors.p95,
+      runs[2].errors.p95, runs[1].filter->GetEstimatedError(), runs[2].filter->GetEstimatedError(),
+      runs[1].errors.l2, runs[2].errors.l2,
+      static_cast<double>(runs[0].filter->GetBytes()) / voxels,
+      static_cast<double>(runs[1].filter->GetBytes()) / voxels,
+      static_cast<double>(runs[2].filter->GetBytes()) / voxels);
+    std::fflush(stdout);
+  }
+}
+
+//------------------------------------------------------------------------------
+void MeasureRegions(const Options& options)
+{
+  Table csv(options, "frugal-region",
+    "scene,run,seconds,p95,l2,active,iterations,applications,times_faster,voxels");
+  std::printf("\n## SetActiveRegion\n\n"
+              "| scene | run | s | times faster | p95 | L2 | active | iterations | bytes / voxel "
+              "|\n|---|---|---|---|---|---|---|---|---|\n");
+  struct Place
+  {
+    std::string name;
+    std::function<vtkSmartPointer<vtkImageData>()> make;
+  };
+  const Place places[] = { { "tube, 128³", [] { return Tube(128); } },
+    { "thorax_ct, aorta, 256²·133", [&] { return Aorta(options.data); } },
+    { "open, 128³", [] { return Open(128); } } };
+  for (const Place& place : places)
+  {
+    if (place.name.find(options.only) == std::string::npos)
+    {
+      continue;
+    }
+    const vtkSmartPointer<vtkImageData> image = place.make();
+    if (!image)
+    {
+      std::printf("| %s | no file | | | | | | | |\n", place.name.c_str());
+      continue;
+    }
+    const std::vector<double> exact = Exact(image);
+    struct Way
+    {
+      const char* name;
+      Setter set;
+    };
+    const Way ways[] = { { "full, tolerance 1e-8 (default)", [](vtkLightDiffusionFilter*) {} },
+      { "full, 1e-4", [](vtkLightDiffusionFilter* f) { f->SetTolerance(1e-4); } },
+      { "region, tolerance 1e-8", [](vtkLightDiffusionFilter* f) { f->SetActiveRegion(true); } },
+      { "region, 1e-4",
+        [](vtkLightDiffusionFilter* f)
+        {
+          f->SetTolerance(1e-4);
+          f->SetActiveRegion(true);
+        } },
+      { "target 1 %", [](vtkLightDiffusionFilter* f) { f->SetTargetError(.01); } } };
+    // In turn, so that quotients mean something on a busy machine.
+    std::vector<std::vector<double>> seconds(std::size(ways));
+    std::vector<std::vector<double>> quotients(std::size(ways));
+    std::vector<Run> last(std::size(ways));
+    for (int i = 0; i < options.repeat; ++i)
+    {
+      for (std::size_t w = 0; w < std::size(ways); ++w)
+      {
+        last[w] = Solve(image, ways[w].set, 1, i + 1 == options.repeat ? &exact : nullptr);
+        seconds[w].push_back(last[w].seconds);
+        quotients[w].push_back(seconds[w == 3 ? 1 : 0].back() / last[w].seconds);
+      }
+    }
+    for (std::size_t w = 0; w < std::size(ways); ++w)
+    {
+      vtkLightDiffusionFilter* f = last[w].filter;
+      std::printf("| %s | %s | %.3f | %.2f | %.1e | %.1e | %.1f %% | %d | %.0f |\n",
+        place.name.c_str(), ways[w].name, median(seconds[w]), median(quotients[w]),
+        last[w].errors.p95, last[w].errors.l2, 100. * f->GetActiveFraction(),
+        f->GetNumberOfIterationsUsed(),
+        static_cast<double>(f->GetBytes()) / static_cast<double>(exact.size()));
+      csv.add(Quoted(place.name), Quoted(ways[w].name), median(seconds[w]), last[w].errors.p95,
+        last[w].errors.l2, f->GetActiveFraction(), f->GetNumberOfIterationsUsed(),
+        f->GetFineGridApplications(), median(quotients[w]), exact.size());
+    }
+    std::fflush(stdout);
+  }
+  std::printf("\nTimes faster: than the full solve to 1e-8; region, 1e-4: than full, 1e-4.\n");
+}
+
+//------------------------------------------------------------------------------
+void MeasureWarmStarts(const Options& options)
+{
+  Table csv(options, "frugal-warm",
+    "medium,move,seconds,pipeline_seconds,l2,p95,iterations,estimated,estimated_l2");
+  std::printf("\n## One seed of eight moved in a converged 128³ field, 20 moves\n\n"
+              "| medium | s, median (most) | with the seeds' filter | L2, median (most) | p95, "
+              "median (most) | iterations |\n|---|---|---|---|---|---|\n");
+  const double media[2][2] = { { .99, 1e-4 }, { .999, 1e-6 } };
+  for (const auto& recipe : media)
+  {
+    const int n = 128;
+    const vtkSmartPointer<vtkImageData> medium = Tissue(n, recipe[0], recipe[1]);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> uniform(.2 * n, .8 * n);
+    vtkNew<vtkLightSeedFilter> seeds;
+    seeds->SetInputData(medium);
+    for (int i = 0; i < 8; ++i)
+    {
+      const double at[3] = { uniform(random), uniform(random), uniform(random) };
+      seeds->AddSphere(at, 2., 1.);
+    }
+    vtkNew<vtkLightDiffusionFilter> warm;
+    warm->SetInputConnection(seeds->GetOutputPort());
+    warm->SetContinue(true);
+    warm->Update(); // converged, to the default tolerance
+    vtkNew<vtkLightDiffusionFilter> full;
+    full->SetInputConnection(seeds->GetOutputPort());
+    full->SetContinue(true);
+    full->SetTolerance(1e-10);
+    full->SetOutputPrecision(vtkAlgorithm::DOUBLE_PRECISION);
+    std::vector<double> seconds, pipeline, l2, p95, iterations;
+    for (int move = 0; move < 20; ++move)
+    {
+      const double at[3] = { uniform(random), uniform(random), uniform(random) };
+      // As a user drags: from a field converged to the default tolerance.
+      warm->SetTargetError(0.);
+      warm->Update();
+      seeds->SetSphere(move % 8, at, 2., 1.);
+      warm->SetTargetError(.01);
+      const double began = now();
+      seeds->Update();
+      const double seeded = now();
+      warm->Update();
+      const double ended = now();
+      full->Update();
+      const Errors errors = Compare(warm, Values(full));
+      seconds.push_back(ended - seeded);
+      pipeline.push_back(ended - began);
+      l2.push_back(errors.l2);
+      p95.push_back(errors.p95);
+      iterations.push_back(warm->GetNumberOfIterationsUsed());
+      csv.add(Quoted("tissue, albedo " + std::to_string(recipe[0])), move, seconds.back(),
+        pipeline.back(), errors.l2, errors.p95, iterations.back(), warm->GetEstimatedError(),
+        warm->GetEstimatedErrorL2());
+    }
+    const auto most = [](const std::vector<double>& v)
+    { return *std::max_element(v.begin(), v.end()); };
+    std::printf(
+      "| albedo %g, contrast %.0e | %.4f (%.4f) | %.4f | %.1e (%.1e) | %.1e (%.1e) | %.0f "
+      "|\n",
+      recipe[0], 1. / recipe[1], median(seconds), most(seconds), median(pipeline), median(l2),
+      most(l2), median(p95), most(p95), median(iterations));
+    std::fflush(stdout);
+  }
+}
+
+//------------------------------------------------------------------------------
+void MeasureKnobs(const Options& options)
+{
+  Table csv(
+    options, "frugal-knobs", "scene,knob,value,seconds,p95,l2,estimated,bytes_per_voxel,voxels");
+  std::printf(
+    "\n## Time against error, every knob, 128³\n\n"
+    "| scene | knob | value | s | p95 | L2 | bytes / voxel |\n|---|---|---|---|---|---|---|\n");
+  const int n = 2 * options.size;
+  struct Place
+  {
+    std::string name;
+    vtkSmartPointer<vtkImageData> image;
+  };
+  const vtkSmartPointer<vtkImageData> tissue = Tissue(n, .99, 1e-4);
+  const Place places[] = { { "tissue", WithSeeds(tissue, { { .35 * n, .4 * n, .5 * n, 2., 1. } }) },
+    { "tube", Tube(n) } };
+  using Set = std::function<void(vtkLightDiffusionFilter*, double)>;
+  struct Knob
+  {
+    const char* name;
+    std::vector<double> values;
+    Set set;
+  };
+  const Knob knobs[] = {
+    { "Tolerance", { 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9 },
+      [](vtkLightDiffusionFilter* f, double v) { f->SetTolerance(v); } },
+    { "TargetError", { .3, .1, .03, .01, 3e-3, 1e-3, 1e-4 },
+      [](vtkLightDiffusionFilter* f, double v) { f->SetTargetError(v); } },
+    { "TimeBudget", { .02, .04, .08, .16, .32 },
+      [](vtkLightDiffusionFilter* f, double v) { f->SetTimeBudget(v); } },
+    { "CoarseningFactor", { 1., 2., 4. },
+      [](vtkLightDiffusionFilter* f, double v) { f->SetCoarseningFactor(static_cast<int>(v)); } },
+    { "ActiveThreshold", { 1e-4, 1e-5, 1e-6, 1e-7, 1e-8 },
+      [](vtkLightDiffusionFilter* f, double v)
+      {
+        f->SetActiveRegion(true);
+        f->SetActiveThreshold(v);
+      } },
+    { "OutputPrecision", { 0., 1. },
+      [](vtkLightDiffusionFilter* f, double v) { f->SetOutputPrecision(static_cast<int>(v)); } },
+    { "ComputeFlux", { 0., 1. },
+      [](vtkLightDiffusionFilter* f, double v) { f->SetComputeFlux(v > 0.); } },
+  };
+  for (const Place& place : places)
+  {
+    const std::vector<double> exact = Exact(place.image);
+    for (const Knob& knob : knobs)
+    {
+      for (const double value : knob.values)
+      {
+        const Run run = Solve(
+          place.image, [&](vtkLightDiffusionFilter* f) { knob.set(f, value); }, options.repeat,
+          &exact);
+        const double bytes =
+          static_cast<double>(run.filter->GetBytes()) / static_cast<double>(exact.size());
+        std::printf("| %s | %s | %g | %.3f | %.1e | %.1e | %.0f |\n", place.name.c_str(), knob.name,
+          value, run.seconds, run.errors.p95, run.errors.l2, bytes);
+        csv.add(place.name, knob.name, value, run.seconds, run.errors.p95, run.errors.l2,
+          run.filter->GetEstimatedError(), bytes, exact.size());
+        std::fflush(stdout);
+      }
+    }
+  }
+}
+
+std::vector<std::string> split(const char* text)
+{
+  std::vector<std::string> parts;
+  std::istringstream in(text);
+  std::string part;
+  while (std::getline(in, part, ','))
+  {
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+bool Parse(int argc, char* argv[], Options& options)
+{
+  for (int i = 1; i + 1 < argc; i += 2)
+  {
+    const std::string option = argv[i];
+    const char* value = argv[i + 1];
+    if (option == "--output")
+    {
+      options.output = value;
+    }
+    else if (option == "--sections")
+    {
+      options.sections = split(value);
+    }
+    else if (option == "--data")
+    {
+      options.data = value;
+    }
+    else if (option == "--only")
+    {
+      options.only = value;
+    }
+    else if (option == "--size")
+    {
+      options.size = std::atoi(value);
+    }
+    else if (option == "--most")
+    {
+      options.most = std::atoi(value);
+    }
+    else if (option == "--repeat")
+    {
+      options.repeat = std::atoi(value);
+    }
+    else if (option == "--threads")
+    {
+      options.threads = std::atoi(value);
+    }
+    else
+    {
+      return false;
+    }
+  }
+  return argc % 2 == 1 && options.size >= 16 && options.most >= 16 && options.repeat > 0 &&
+    options.threads > 0;
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  Options options;
+  if (!Parse(argc, argv, options))
+  {
+    std::fprintf(stderr,
+      "usage: bench-frugal [--output FOLDER] [--sections grid,region,warm,target,budget,knobs]\n"
+      "  [--size 64] [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD]\n");
+    return 2;
+  }
+  std::filesystem::create_directories(options.output);
+  vtkSMPTools::Initialize(options.threads);
+  vtkObject::SetGlobalWarningDisplay(
+    std::getenv("WARN") ? 1 : 0); // a budget that is used up is no surprise here
+  std::printf("# bench-frugal\n\n%d threads, medians of %d.\n", options.threads, options.repeat);
+  const std::pair<const char*, void (*)(const Options&)> sections[] = {
+    { "warm", MeasureWarmStarts }, { "region", MeasureRegions }, { "grid", MeasureGrids },
+    { "knobs", MeasureKnobs }, { "target", MeasureTargets }, { "budget", MeasureBudgets }
+  };
+  for (const auto& section : sections)
+  {
+    if (options.has(section.first))
+    {
+      section.second(options);
+    }
+  }
+  return 0;
+}
