@@ -81,6 +81,46 @@ struct MediumKey
   }
 };
 
+/** The largest magnitude; bad: the first value that is not finite, if any. */
+template <class T>
+double largestOf(
+  const T* values, vtkIdType size, const lighttransport::ParallelFor& parallel, vtkIdType& bad)
+{
+  constexpr vtkIdType piece = 65536;
+  struct Found
+  {
+    double largest = 0.;
+    vtkIdType bad = -1;
+  };
+  std::vector<Found> pieces(static_cast<std::size_t>((size + piece - 1) / piece));
+  parallel(static_cast<std::int64_t>(pieces.size()),
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t p = begin; p < end; ++p)
+      {
+        const vtkIdType last = std::min<vtkIdType>(size, (p + 1) * piece);
+        T most = T(0);
+        Found& found = pieces[static_cast<std::size_t>(p)];
+        for (vtkIdType i = p * piece; i < last; ++i)
+        {
+          const bool finite = std::isfinite(values[i]); // a NaN must not be compared
+          const T v = finite ? std::abs(values[i]) : T(0);
+          most = v > most ? v : most;
+          found.bad = finite || found.bad >= 0 ? found.bad : i;
+        }
+        found.largest = static_cast<double>(most);
+      }
+    });
+  Found all;
+  for (const Found& found : pieces)
+  {
+    all.largest = std::max(all.largest, found.largest);
+    all.bad = all.bad < 0 ? found.bad : all.bad;
+  }
+  bad = all.bad;
+  return all.largest;
+}
+
 /** The array's values as they lie in memory, or converted where their type is another. */
 template <class T, class ArrayT>
 const T* valuesOf(vtkDataArray* array, std::vector<T>& converted)
@@ -577,23 +617,22 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   {
     qFloat = valuesOf<float, vtkFloatArray>(source, floatStore);
   }
-  double largest = 0.;
-  for (vtkIdType i = 0; i < size; ++i)
+  const auto parallel = vtkLightTransportParallelFor();
+  vtkIdType bad = -1;
+  const double largest =
+    doubleSource ? largestOf(qDouble, size, parallel, bad) : largestOf(qFloat, size, parallel, bad);
+  if (bad >= 0)
   {
-    const double q = doubleSource ? qDouble[i] : static_cast<double>(qFloat[i]);
-    if (!std::isfinite(q))
-    {
-      int dims[3];
-      input->GetDimensions(dims);
-      const int* extent = input->GetExtent();
-      text << "the source is " << q << " at voxel (" << extent[0] + i % dims[0] << ", "
-           << extent[2] + (i / dims[0]) % dims[1] << ", "
-           << extent[4] + i / (static_cast<vtkIdType>(dims[0]) * dims[1])
-           << "); expected finite values (power/length^3)";
-      problem = text.str();
-      return false;
-    }
-    largest = std::max(largest, std::abs(q));
+    int dims[3];
+    input->GetDimensions(dims);
+    const int* extent = input->GetExtent();
+    text << "the source is " << (doubleSource ? qDouble[bad] : static_cast<double>(qFloat[bad]))
+         << " at voxel (" << extent[0] + bad % dims[0] << ", "
+         << extent[2] + (bad / dims[0]) % dims[1] << ", "
+         << extent[4] + bad / (static_cast<vtkIdType>(dims[0]) * dims[1])
+         << "); expected finite values (power/length^3)";
+    problem = text.str();
+    return false;
   }
   if (largest > 1e100)
   {
@@ -914,11 +953,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
 
   // 4. the arrays
   const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION;
-  double extreme = 0.;
-  for (vtkIdType i = 0; i < size; ++i)
-  {
-    extreme = std::max(extreme, std::abs(phi[i]));
-  }
+  const double extreme = largestOf(phi.data(), size, parallel, bad);
   if (!toDouble && extreme > static_cast<double>(std::numeric_limits<float>::max()))
   {
     text << "the fluence reaches " << extreme
@@ -932,15 +967,23 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   {
     vtkNew<vtkDoubleArray> array;
     array->SetNumberOfTuples(size);
-    std::copy(phi.data(), phi.data() + size, array->GetPointer(0));
+    double* to = array->GetPointer(0);
+    parallel(size,
+      [&](std::int64_t begin, std::int64_t end)
+      { std::copy(phi.data() + begin, phi.data() + end, to + begin); });
     fluence = array;
   }
   else
   {
     vtkNew<vtkFloatArray> array;
     array->SetNumberOfTuples(size);
-    std::transform(phi.data(), phi.data() + size, array->GetPointer(0),
-      [](double value) { return static_cast<float>(value); });
+    float* to = array->GetPointer(0);
+    parallel(size,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        std::transform(phi.data() + begin, phi.data() + end, to + begin,
+          [](double value) { return static_cast<float>(value); });
+      });
     fluence = array;
   }
   fluence->SetName(names::Fluence);

@@ -150,7 +150,8 @@ CoarseDiffusion::CoarseDiffusion(ParallelFor how)
 
 std::int64_t CoarseDiffusion::bytes() const
 {
-  return this->w[0].bytes() + this->w[1].bytes() + this->w[2].bytes() + this->psi.bytes();
+  return this->w[0].bytes() + this->w[1].bytes() + this->w[2].bytes() + this->psi.bytes() +
+    this->cellSource.bytes() + this->cellPhi.bytes() + this->before.bytes();
 }
 
 void CoarseDiffusion::load(std::int64_t row, float* D, float* s) const
@@ -1035,9 +1036,15 @@ DiffusionReport CoarseDiffusion::solve(
 {
   const double began = now();
   const std::int64_t size = this->fine.size();
-  Buffer<double> b(this->coarse.size());
-  Buffer<double> x(this->coarse.size());
-  Buffer<double> before(size);
+  if (this->before.size() != size)
+  {
+    this->cellSource.allocate(this->coarse.size());
+    this->cellPhi.allocate(this->coarse.size());
+    this->before.allocate(size);
+  }
+  Buffer<double>& b = this->cellSource;
+  Buffer<double>& x = this->cellPhi;
+  Buffer<double>& kept = this->before;
   const bool named = control.targetError > 0. || control.timeBudget > 0.;
   DiffusionControl own;
   own.maxIterations = control.maxIterations;
@@ -1092,10 +1099,10 @@ DiffusionReport CoarseDiffusion::solve(
       report.message = "the time budget is used up";
       break;
     }
-    report.residual = this->residual(q, phi, before.data());
-    this->restrict(before.data(), b.data());
+    report.residual = this->residual(q, phi, kept.data());
+    this->restrict(kept.data(), b.data());
     whole = solveCells(1e-2);
-    std::copy(phi, phi + size, before.data());
+    std::copy(phi, phi + size, kept.data());
     this->prolong(x.data(), phi);
     this->relax(q, phi);
     report.fineApplications += 4.;
@@ -1103,12 +1110,12 @@ DiffusionReport CoarseDiffusion::solve(
     {
       break;
     }
-    const Change change = this->compare(before.data(), phi);
+    const Change change = this->compare(kept.data(), phi);
     spent = now() - start;
     if (i > 0 && change.l2 > last.l2)
     {
       // The cells' equations are too far from the voxels' here: the correction overshoots.
-      std::copy(before.data(), before.data() + size, phi);
+      std::copy(kept.data(), kept.data() + size, phi);
       shrinking = false;
       report.estimatedError = std::max(report.estimatedError, last.p95);
       report.estimatedErrorL2 = std::max(report.estimatedErrorL2, last.l2);
@@ -1148,14 +1155,20 @@ DiffusionReport CoarseDiffusion::solve(
       report.message = "the coarse grid's corrections do not reach the error that was named";
     }
   }
-  double power = 0.;
-  for (std::int64_t i = 0; i < size; ++i)
-  {
-    power += static_cast<double>(q[i]) * static_cast<double>(q[i]);
-  }
+  const int nx = this->fine.dims[0];
+  const double power = SumRows(this->parallelFor, size / nx, size,
+    [&](std::int64_t r)
+    {
+      double sum = 0.;
+      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+      {
+        sum += static_cast<double>(q[i]) * static_cast<double>(q[i]);
+      }
+      return sum;
+    });
   report.residual = power > 0. ? report.residual / std::sqrt(power) : 0.;
   this->balance(q, phi, report);
-  report.bytes += this->bytes() + b.bytes() + x.bytes() + before.bytes();
+  report.bytes += this->bytes();
   report.seconds = now() - began;
   return report;
 }
@@ -1192,8 +1205,8 @@ CoarseDiffusion::Change CoarseDiffusion::compare(const double* before, const dou
     total.changed += row.changed;
     total.all += row.all;
   }
-  // some hundred thousand voxels tell the percentile
-  const std::int64_t step = std::max<std::int64_t>(1, this->fine.size() / 300000) | 1;
+  // a hundred thousand voxels tell the percentile
+  const std::int64_t step = std::max<std::int64_t>(1, this->fine.size() / 100000) | 1;
   std::vector<float> ratios;
   for (std::int64_t r = 0; r < rows; r += step)
   {

@@ -21,7 +21,7 @@
  *      assembled: the corrections shrink about fivefold each, and tell the error that is left.
  *
  * Axes are coarsened until a cell is about as long along each: f voxels of the finest axis.
- * Memory: 4 bytes per voxel and the coarse solver's.
+ * Memory: 12 bytes per voxel and the coarse solver's.
  */
 #ifndef LightTransport_Core_Coarse_h
 #define LightTransport_Core_Coarse_h
@@ -113,6 +113,7 @@ private:
   std::array<Buffer<std::uint8_t>, 3> w;            // weight of the neighbouring cell, /255
   Buffer<std::uint8_t> psi;                         // /255
   DiffusionSolver solver;
+  Buffer<double> cellSource, cellPhi, before; // of the last solve, for the next
 };
 } // namespace lighttransport
 
