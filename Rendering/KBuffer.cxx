@@ -533,7 +533,7 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
   const std::string head = "#version 430 core\n" + this->Defines(this->Room()) +
     define("LT_SINGLE_BUCKET", this->Now.singleBucket) + vtkBucketedKBufferRead +
     vtkBucketedKBufferPixel;
-  const auto run = [&](ComputeProgram& program, const std::string& body)
+  const auto run = [&](ComputeProgram& program, int stage, const std::string& body)
   {
     const std::string problem = program.Use(head + body);
     if (problem.empty())
@@ -551,11 +551,12 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
       this->FreeUnits();
     }
     glUseProgram(0);
+    this->Mark(stage);
     return problem;
   };
   const std::string problem =
-    run(this->Order, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
-  return problem.empty() ? run(this->Match, vtkBucketedKBufferMatch) : problem;
+    run(this->Order, 3, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
+  return problem.empty() ? run(this->Match, 4, vtkBucketedKBufferMatch) : problem;
 }
 
 //------------------------------------------------------------------------------
@@ -632,6 +633,19 @@ bool KBuffer::Blend(int first, int last)
   }
   this->FreeUnits();
   return true;
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::Mark(int stage)
+{
+  if (this->Measure)
+  {
+    glFinish();
+    const auto now = std::chrono::steady_clock::now();
+    this->Milliseconds[stage] +=
+      std::chrono::duration<double, std::milli>(now - this->LastMark).count();
+    this->LastMark = now;
+  }
 }
 
 //------------------------------------------------------------------------------

@@ -14,6 +14,7 @@
 #include "vtkWeakPointer.h"
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <utility>
@@ -85,6 +86,11 @@ public:
   // Stages; see vtkBucketedKBufferPass.h.
   void CopyTarget(); // 1: depth and colour of what is bound
   void SetCamera(vtkRenderer* renderer, vtkProp** props, int count);
+  /** Notes the time since the last mark as a stage's; waits for OpenGL first. */
+  void Mark(int stage);
+  bool Measure = false;
+  std::array<double, 6> Milliseconds{}; // by stage
+
   double SceneLength = 1.;               // diagonal of what is translucent
   void BeginGeometry(int low, int high); // 2: clears, binds
   vtkTypeInt64 EndGeometry();            // how many nodes were asked for
@@ -131,6 +137,8 @@ private:
   std::array<float, 2> DepthToVC{};
   std::array<float, 2> DepthRange{};
   float Footprint = 1.F;
+
+  std::chrono::steady_clock::time_point LastMark;
 
   std::vector<StorageBuffer*> All();
   int Room() const;

@@ -357,7 +357,11 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
   state->vtkglDisable(GL_MULTISAMPLE);
 
   // 1. what is there already
+  buffer.Measure = this->MeasureStages;
+  buffer.Milliseconds.fill(0.);
+  buffer.Mark(0);
   buffer.CopyTarget();
+  buffer.Mark(1);
   const vtkTypeInt64 most = buffer.MostNodes(this->MemoryLimit);
   if (buffer.Capacity > most)
   {
@@ -462,6 +466,7 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
     }
   }
   this->NumberOfFragments += nodes;
+  buffer.Mark(2);
   this->NumberOfRenderedProps = translucent->GetNumberOfRenderedProps();
 
   // 3. order, 4. neighbours, 5. blending
@@ -475,6 +480,7 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
     }
   }
   buffer.Blend(first, last); // where its shader isn't built, VTK says why
+  buffer.Mark(5);
   return true;
 }
 
@@ -607,6 +613,12 @@ vtkTypeInt64 vtkBucketedKBufferPass::GetMemoryInBytes()
 }
 
 //------------------------------------------------------------------------------
+double vtkBucketedKBufferPass::GetStageMilliseconds(int stage)
+{
+  return stage >= 1 && stage <= 5 ? this->Internals->Buffer.Milliseconds[stage] : 0.;
+}
+
+//------------------------------------------------------------------------------
 int vtkBucketedKBufferPass::GetBitsPerFragment()
 {
   return this->Internals->Buffer.BitsPerFragment();
@@ -637,6 +649,7 @@ void vtkBucketedKBufferPass::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ColorPrecision: " << (this->ColorPrecision == Float ? "Float" : "Half") << "\n";
   os << indent << "MemoryLimit: " << this->MemoryLimit << "\n";
   os << indent << "CurvatureScale: " << this->CurvatureScale << "\n";
+  os << indent << "MeasureStages: " << this->MeasureStages << "\n";
   os << indent << "SingleBucket: " << this->SingleBucket << "\n";
   os << indent << "NumberOfFragments: " << this->NumberOfFragments << "\n";
   os << indent << "NumberOfBands: " << this->NumberOfBands << "\n";

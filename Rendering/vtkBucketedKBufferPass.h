@@ -187,6 +187,17 @@ public:
   int GetBitsPerFragment();
   ///@}
 
+  ///@{
+  /**
+   * Measure the stages, 1 to 5 as numbered above: slower, since each is waited for. 0
+   * for other numbers, and where a frame was not measured. Off by default.
+   */
+  vtkSetMacro(MeasureStages, bool);
+  vtkGetMacro(MeasureStages, bool);
+  vtkBooleanMacro(MeasureStages, bool);
+  double GetStageMilliseconds(int stage);
+  ///@}
+
   /**
    * Whether the last frame was drawn by vtkDualDepthPeelingPass for want of
    * OpenGL 4.3.
@@ -212,6 +223,7 @@ protected:
   vtkTypeInt64 NumberOfFragments = 0;
   double CurvatureScale = 0.;
   bool SingleBucket = false;
+  bool MeasureStages = false;
   int NumberOfBands = 0;
   int NumberOfGeometryPasses = 0;
   bool UsedFallback = false;

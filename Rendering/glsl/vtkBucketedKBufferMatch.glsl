@@ -19,58 +19,63 @@ float ltBackError[LT_ROOM]; // of the other pixel's fragments: their best so far
 int ltBack[LT_ROOM];
 int ltForth[LT_ROOM];
 
+// Loops test at their end: SIMD machines run a body once more, for nothing, where the
+// test comes first.
 void ltMatch(uvec2 here, uvec2 there, uint shift)
 {
   int first = int(here.x);
   int count = int(here.y);
   int firstThere = int(there.x);
   int countThere = int(there.y);
-  for (int slot = 0; slot < count; ++slot)
+  int slot = 0;
+  do
   {
     uvec2 bucket = texelFetch(ltBuckets, first + slot).xy;
     ivec2 range = ivec2(int(bucket.y & 255u), int((bucket.y >> 8u) & 255u));
-    ivec2 other = bucket.y != 0u ? ltFindBucket(firstThere, countThere, bucket.x) : ivec2(1, 0);
-    if (other.x > other.y)
+    ivec2 other = ltFindBucket(firstThere, countThere, bucket.x);
+    if (bucket.y != 0u && other.x <= other.y)
     {
-      range = ivec2(1, 0);
-    }
-    for (int j = other.x; j <= other.y; ++j)
-    {
-      ltBackError[j] = 1e30;
-      ltBack[j] = -1;
-    }
-    for (int i = range.x; i <= range.y; ++i)
-    {
-      uvec2 record = texelFetch(ltRecords, first + i).xy;
-      float z = uintBitsToFloat(record.x);
-      float inverse = 1.0 / ltFootprintAt(z);
-      vec3 n = ltUnpackNormal(record.y);
-      float best = record.y == LT_NO_NORMAL ? -1.0 : 1e30;
-      int bestJ = -1;
-      for (int j = other.x; j <= other.y; ++j)
+      int i = range.x;
+      do
       {
-        uvec2 candidate = texelFetch(ltRecords, firstThere + j).xy;
-        float dz = (z - uintBitsToFloat(candidate.x)) * inverse;
-        float epsilon = 1.0 - dot(n, ltUnpackNormal(candidate.y)) + dz * dz;
-        bool better = epsilon < best && candidate.y != LT_NO_NORMAL;
-        best = better ? epsilon : best;
-        bestJ = better ? j : bestJ;
-        bool back = epsilon < ltBackError[j] && record.y != LT_NO_NORMAL;
-        ltBackError[j] = back ? epsilon : ltBackError[j];
-        ltBack[j] = back ? i : ltBack[j];
-      }
-      ltForth[i] = bestJ;
-    }
-    for (int i = range.x; i <= range.y; ++i)
-    {
-      int j = ltForth[i];
-      if (j >= 0 && ltBack[j] == i)
+        uvec2 record = texelFetch(ltRecords, first + i).xy;
+        float z = uintBitsToFloat(record.x);
+        float inverse = 1.0 / ltFootprintAt(z);
+        vec3 n = ltUnpackNormal(record.y);
+        float best = 1e30;
+        int bestJ = -1;
+        int j = other.x;
+        do
+        {
+          uvec2 candidate = texelFetch(ltRecords, firstThere + j).xy;
+          float dz = (z - uintBitsToFloat(candidate.x)) * inverse;
+          float epsilon = 1.0 - dot(n, ltUnpackNormal(candidate.y)) + dz * dz;
+          epsilon = record.y == LT_NO_NORMAL || candidate.y == LT_NO_NORMAL ? 1e30 : epsilon;
+          bool better = epsilon < best;
+          best = better ? epsilon : best;
+          bestJ = better ? j : bestJ;
+          bool back = i == range.x || epsilon < ltBackError[j];
+          ltBackError[j] = back ? epsilon : ltBackError[j];
+          ltBack[j] = back ? i : ltBack[j];
+          ++j;
+        } while (j <= other.y);
+        ltForth[i] = bestJ;
+        ++i;
+      } while (i <= range.y);
+      i = range.x;
+      do
       {
-        atomicOr(ltNeighbor[first + i], uint(j + 1) << shift);
-        atomicOr(ltNeighbor[firstThere + j], uint(i + 1) << (shift + 16u));
-      }
+        int j = ltForth[i];
+        if (j >= 0 && ltBack[j] == i)
+        {
+          atomicOr(ltNeighbor[first + i], uint(j + 1) << shift);
+          atomicOr(ltNeighbor[firstThere + j], uint(i + 1) << (shift + 16u));
+        }
+        ++i;
+      } while (i <= range.y);
     }
-  }
+    ++slot;
+  } while (slot < count);
 }
 
 void main()
@@ -86,9 +91,10 @@ void main()
   for (int side = 0; side < 2; ++side)
   {
     bool inside = side == 0 ? column + 1 < ltSize.x : row + 1 < ltLastRow;
-    if (inside)
+    uvec2 there = texelFetch(ltPixels, inside ? pixel + (side == 0 ? 1 : ltSize.x) : pixel).xy;
+    if (inside && here.y > 0u && there.y > 0u)
     {
-      ltMatch(here, texelFetch(ltPixels, pixel + (side == 0 ? 1 : ltSize.x)).xy, uint(side) * 8u);
+      ltMatch(here, there, uint(side) * 8u);
     }
   }
 }

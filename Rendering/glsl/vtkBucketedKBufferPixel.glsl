@@ -28,30 +28,34 @@ uniform float ltFootprint; // size of a pixel, at distance 1 if not parallel
 
 #define LT_NO_BUCKET uvec2(0u)
 
+// shape mod slots. Actors are numbered one after the other: no collisions among as many
+// as there are slots. By floats, exact below 2^24: SIMD machines divide integers slowly.
 uint ltSlot(uint shape, uint slots)
 {
-  uint h = shape * 0x9E3779B1u;
-  return ((h >> 16u) * slots) >> 16u;
+  int n = int(slots);
+  int s = int(shape & 0xFFFFFFu);
+  int rest = s - n * int(float(s) / float(n));
+  rest += rest < 0 ? n : 0;
+  return uint(rest >= n ? rest - n : rest);
 }
 
 // First i and last i of a shape's fragments in the pixel; x > y: there are none.
 ivec2 ltFindBucket(int first, int count, uint shape)
 {
   int slot = int(ltSlot(shape, uint(count)));
-  for (int tries = 0; tries < count; ++tries)
+  ivec2 range = ivec2(1, 0);
+  int tries = 0;
+  bool again;
+  do
   {
     uvec2 bucket = texelFetch(ltBuckets, first + slot).xy;
-    if (bucket.y == 0u)
-    {
-      break;
-    }
-    if (bucket.x == shape)
-    {
-      return ivec2(int(bucket.y & 255u), int((bucket.y >> 8u) & 255u));
-    }
+    bool found = bucket.x == shape && bucket.y != 0u;
+    range = found ? ivec2(int(bucket.y & 255u), int((bucket.y >> 8u) & 255u)) : range;
     slot = slot + 1 == count ? 0 : slot + 1;
-  }
-  return ivec2(1, 0);
+    ++tries;
+    again = !found && bucket.y != 0u && tries < count;
+  } while (again);
+  return range;
 }
 
 float ltDepthDCToZ(uint depthBits)
