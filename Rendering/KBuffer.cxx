@@ -5,12 +5,15 @@
 #include "vtkBucketedKBufferBlend.h"
 #include "vtkBucketedKBufferCurvature.h"
 #include "vtkBucketedKBufferExtensions.h"
+#include "vtkBucketedKBufferLines.h"
 #include "vtkBucketedKBufferList.h"
 #include "vtkBucketedKBufferMatch.h"
 #include "vtkBucketedKBufferOrder.h"
 #include "vtkBucketedKBufferPixel.h"
 #include "vtkBucketedKBufferRead.h"
+#include "vtkBucketedKBufferSmooth.h"
 #include "vtkBucketedKBufferStyle.h"
+#include "vtkBucketedKBufferTensor.h"
 #include "vtkCurvatureOpacityFunction.h"
 #include "vtkCurvatureOpacityProperty.h"
 
@@ -49,7 +52,7 @@ std::vector<StorageBuffer*> KBuffer::All()
 {
   return { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter,
     &this->Pixels, &this->Records, &this->NodeList, &this->Buckets, &this->Neighbors,
-    &this->Tensors };
+    &this->Tensors, &this->SmoothTensors };
 }
 
 //------------------------------------------------------------------------------
@@ -62,6 +65,7 @@ void KBuffer::Release(vtkWindow* window)
   this->Order.Release();
   this->Match.Release();
   this->Tensor.Release();
+  this->Smooth.Release();
   for (auto* texture : { &this->OpaqueDepth, &this->TargetColor, &this->ShadingTable,
          &this->OpacityTable, &this->ParameterTable })
   {
@@ -146,7 +150,7 @@ void KBuffer::ReserveNodes(vtkTypeInt64 nodes)
 void KBuffer::ReleaseNodes()
 {
   for (StorageBuffer* buffer : { &this->Links, &this->Colors, &this->Surfaces, &this->Records,
-         &this->NodeList, &this->Buckets, &this->Neighbors, &this->Tensors })
+         &this->NodeList, &this->Buckets, &this->Neighbors, &this->Tensors, &this->SmoothTensors })
   {
     buffer->Release();
   }
@@ -159,7 +163,7 @@ int KBuffer::BitsPerFragment() const
   const int list = 32 + 32 + (this->Now.floatColor ? 128 : 64); // next, depth, colour
   // shape, normal; then z, normal, node, bucket, neighbours
   const int style = this->Now.style ? 32 + 32 + 32 + 32 + 32 + 64 + 32 : 0;
-  return list + style + (this->Now.lines ? 128 : 0);
+  return list + style + (this->Now.lines ? 128 + 128 : 0);
 }
 
 //------------------------------------------------------------------------------
@@ -211,7 +215,8 @@ void KBuffer::BindForReading(const Uniforms& uniforms)
          Reader{ &this->NodeList, "ltNodeList", GL_R32UI },
          Reader{ &this->Buckets, "ltBuckets", GL_RG32UI },
          Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
-         Reader{ &this->Tensors, "ltTensors", GL_RGBA32UI } })
+         Reader{
+           this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI } })
   {
     if (r.buffer->Bytes > 0 && uniforms.Has(r.name))
     {
@@ -554,9 +559,31 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
     this->Mark(stage);
     return problem;
   };
-  const std::string problem =
+  std::string problem =
     run(this->Order, 3, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
-  return problem.empty() ? run(this->Match, 4, vtkBucketedKBufferMatch) : problem;
+  if (problem.empty())
+  {
+    problem = run(this->Match, 4, vtkBucketedKBufferMatch);
+  }
+  if (problem.empty() && this->Now.lines)
+  {
+    this->Tensors.Reserve(listed * 16);
+    this->SmoothTensors.Reserve(listed * 16);
+    this->LatestTensors = &this->Tensors;
+    this->Tensors.Bind();
+    problem =
+      run(this->Tensor, 4, std::string(vtkBucketedKBufferCurvature) + vtkBucketedKBufferTensor);
+    for (int i = 0; i < this->Now.smoothing && problem.empty(); ++i)
+    {
+      StorageBuffer* next =
+        this->LatestTensors == &this->Tensors ? &this->SmoothTensors : &this->Tensors;
+      next->Bind();
+      problem =
+        run(this->Smooth, 4, std::string(vtkBucketedKBufferCurvature) + vtkBucketedKBufferSmooth);
+      this->LatestTensors = next;
+    }
+  }
+  return problem;
 }
 
 //------------------------------------------------------------------------------
@@ -572,7 +599,8 @@ bool KBuffer::Blend(int first, int last)
   if (!this->Quad || this->QuadKey != key)
   {
     const std::string body = this->Now.style
-      ? std::string(vtkBucketedKBufferPixel) + vtkBucketedKBufferCurvature + vtkBucketedKBufferStyle
+      ? std::string(vtkBucketedKBufferPixel) + vtkBucketedKBufferCurvature +
+        (this->Now.lines ? vtkBucketedKBufferLines : "") + vtkBucketedKBufferStyle
       : std::string(vtkBucketedKBufferList) + vtkBucketedKBufferBlend;
     const std::string source = std::string("//VTK::System::Dec\n") + vtkBucketedKBufferExtensions +
       "//VTK::Output::Dec\n" + key + vtkBucketedKBufferRead + body;

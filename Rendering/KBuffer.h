@@ -54,6 +54,7 @@ public:
     bool floatColor = false;
     bool singleBucket = false;
     PictureTarget into;
+    int smoothing = 0; // of the curvature, for lines
     double curvatureScale = 1.;
   };
 
@@ -114,9 +115,12 @@ private:
   StorageBuffer Buckets{ 0 };
   StorageBuffer Neighbors{ 1 };
   StorageBuffer Tensors{ 2 };
+  StorageBuffer SmoothTensors{ 2 };
+  StorageBuffer* LatestTensors = nullptr;
   ComputeProgram Order;
   ComputeProgram Match;
   ComputeProgram Tensor;
+  ComputeProgram Smooth;
   int OpaqueDepthFormat = -1;
   vtkSmartPointer<vtkOpenGLFramebufferObject> DepthTarget;
   vtkSmartPointer<vtkTextureObject> TargetColor;

@@ -151,6 +151,7 @@ void vtkBucketedKBufferPass::vtkInternals::FindShapes(vtkProp** props, int count
   for (const auto& style : buffer.Styles)
   {
     buffer.Now.style = buffer.Now.style || style->HasEffect();
+    buffer.Now.lines = buffer.Now.lines || style->HasLines();
   }
 }
 
@@ -329,6 +330,7 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
   now.layers = this->NumberOfLayers;
   now.floatColor = this->ColorPrecision == Float;
   now.singleBucket = this->SingleBucket;
+  now.smoothing = this->LineSmoothing;
   now.into = lighttransport::PictureTarget::Bound();
   if (now.style)
   {
@@ -431,7 +433,7 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
   KBuffer& buffer = this->Internals->Buffer;
   vtkRenderPass* translucent = this->Internals->TranslucentPass;
   // More rows on either side, for neighbours, and for the neighbours' neighbours.
-  const int around = buffer.Now.style ? (buffer.Now.lines ? 2 : 1) : 0;
+  const int around = buffer.Now.style ? (buffer.Now.lines ? 2 + buffer.Now.smoothing : 1) : 0;
   const int low = std::max(first - around, 0);
   const int high = std::min(last + around, buffer.Now.size[1]);
 
@@ -650,6 +652,7 @@ void vtkBucketedKBufferPass::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MemoryLimit: " << this->MemoryLimit << "\n";
   os << indent << "CurvatureScale: " << this->CurvatureScale << "\n";
   os << indent << "MeasureStages: " << this->MeasureStages << "\n";
+  os << indent << "LineSmoothing: " << this->LineSmoothing << "\n";
   os << indent << "SingleBucket: " << this->SingleBucket << "\n";
   os << indent << "NumberOfFragments: " << this->NumberOfFragments << "\n";
   os << indent << "NumberOfBands: " << this->NumberOfBands << "\n";

@@ -41,7 +41,8 @@
  * 4. neighbours (compute, with stylisation only): in the four pixels around, the
  *    fragment of the same shape with the least
  *      epsilon = (1 - n . n') + |z - z'|^2,   z in footprints of a pixel
- *    if each is the other's best. Only the shape's bucket is searched;
+ *    if each is the other's best. Only the shape's bucket is searched. For lines, the
+ *    curvature tensors too;
  * 5. blending: curvature from the neighbours and stylisation
  *    (vtkCurvatureOpacityProperty), then front to back "over" (Porter and Duff 1984).
  *
@@ -157,6 +158,16 @@ public:
 
   ///@{
   /**
+   * How many times the curvature is averaged with that of the neighbours before lines are
+   * made of it, from 0 to 64 (clamped); 8 (default) is a width of about two pixels. More
+   * for coarse meshes, whose triangles show otherwise. Nothing else is smoothed.
+   */
+  vtkSetClampMacro(LineSmoothing, int, 0, 64);
+  vtkGetMacro(LineSmoothing, int);
+  ///@}
+
+  ///@{
+  /**
    * Search for neighbours among all fragments of a pixel, as if they were one shape:
    * the brute force of Carnecky et al. 2013, for comparison. Off by default.
    */
@@ -222,6 +233,7 @@ protected:
   vtkTypeInt64 MemoryLimit = vtkTypeInt64(1) << 30;
   vtkTypeInt64 NumberOfFragments = 0;
   double CurvatureScale = 0.;
+  int LineSmoothing = 8;
   bool SingleBucket = false;
   bool MeasureStages = false;
   int NumberOfBands = 0;

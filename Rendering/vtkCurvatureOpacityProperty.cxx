@@ -85,14 +85,27 @@ vtkCurvatureOpacityFunction* vtkCurvatureOpacityProperty::GetOpacityFunction()
 //------------------------------------------------------------------------------
 bool vtkCurvatureOpacityProperty::HasEffect()
 {
-  return this->CurvatureShading || this->CurvatureOpacity || this->RadianceScaling > 0.;
+  return this->CurvatureShading || this->CurvatureOpacity || this->RadianceScaling > 0. ||
+    this->HasLines();
+}
+
+//------------------------------------------------------------------------------
+bool vtkCurvatureOpacityProperty::HasLines()
+{
+  return this->OccludingContours || this->SuggestiveContours || this->RidgesAndValleys ||
+    this->DemarcatingCurves;
 }
 
 //------------------------------------------------------------------------------
 std::array<float, 16> vtkCurvatureOpacityProperty::GetParameters()
 {
+  const auto width = [this](bool on) { return on ? static_cast<float>(this->LineWidth) : 0.F; };
   return { this->CurvatureShading ? 1.F : 0.F, this->CurvatureOpacity ? 1.F : 0.F,
-    static_cast<float>(this->RadianceScaling) };
+    static_cast<float>(this->RadianceScaling), static_cast<float>(this->LineThreshold),
+    width(this->OccludingContours), width(this->SuggestiveContours), width(this->RidgesAndValleys),
+    width(this->DemarcatingCurves), static_cast<float>(this->LineColor[0]),
+    static_cast<float>(this->LineColor[1]), static_cast<float>(this->LineColor[2]),
+    static_cast<float>(this->LineOpacity) };
 }
 
 //------------------------------------------------------------------------------
@@ -118,4 +131,13 @@ void vtkCurvatureOpacityProperty::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "CurvatureOpacity: " << this->CurvatureOpacity << "\n";
   os << indent << "OpacityFunction: " << this->OpacityFunction.Get() << "\n";
   os << indent << "RadianceScaling: " << this->RadianceScaling << "\n";
+  os << indent << "OccludingContours: " << this->OccludingContours << "\n";
+  os << indent << "SuggestiveContours: " << this->SuggestiveContours << "\n";
+  os << indent << "RidgesAndValleys: " << this->RidgesAndValleys << "\n";
+  os << indent << "DemarcatingCurves: " << this->DemarcatingCurves << "\n";
+  os << indent << "LineWidth: " << this->LineWidth << "\n";
+  os << indent << "LineColor: " << this->LineColor[0] << " " << this->LineColor[1] << " "
+     << this->LineColor[2] << "\n";
+  os << indent << "LineOpacity: " << this->LineOpacity << "\n";
+  os << indent << "LineThreshold: " << this->LineThreshold << "\n";
 }

@@ -28,7 +28,10 @@
  *    surface's own; depth is 0 at the nearest and 1 at the farthest point of the
  *    bounds of what is translucent
  *
- * Lines and points have no curvature and stay as they are.
+ * 4. lines, a layer over this one
+ *
+ * Points and wireframes have no curvature and stay as they are. Opaque actors take part
+ * after vtkActor::ForceTranslucentOn.
  *
  * @sa vtkBucketedKBufferPass vtkCurvatureOpacityPolyDataMapper
  */
@@ -93,15 +96,71 @@ public:
 
   ///@{
   /**
-   * Strength of radiance scaling, in [0,10] (clamped): 0 (default) is none, 2 strong.
-   * The light of its reflectance is at the eye; the invariant point is 0.2.
+   * Strength of radiance scaling, in [0,10] (clamped): 0 (default) is none, 0.5 plain to see, 2 a
+   * drawing. The light of its reflectance is at the eye; the invariant point is 0.2.
    */
   vtkSetClampMacro(RadianceScaling, double, 0., 10.);
   vtkGetMacro(RadianceScaling, double);
   ///@}
 
-  /** Whether anything is on. */
+  ///@{
+  /**
+   * Lines on the surface, of every layer, off by default:
+   * - occluding contours, where the surface turns away from the eye (n . v = 0) or ends;
+   * - suggestive contours (DeCarlo et al. 2003), where it nearly does: the curvature
+   *   towards the eye is 0 and grows;
+   * - ridges and valleys: the stronger principal curvature is extreme along its direction;
+   * - demarcating curves (Kolomenkin et al. 2008), the inflections between those: no
+   *   curvature along the direction in which it changes most.
+   * The last three need the second derivatives of normals: they want smooth meshes, and
+   * vtkBucketedKBufferPass::SetLineSmoothing.
+   */
+  vtkSetMacro(OccludingContours, bool);
+  vtkGetMacro(OccludingContours, bool);
+  vtkBooleanMacro(OccludingContours, bool);
+  vtkSetMacro(SuggestiveContours, bool);
+  vtkGetMacro(SuggestiveContours, bool);
+  vtkBooleanMacro(SuggestiveContours, bool);
+  vtkSetMacro(RidgesAndValleys, bool);
+  vtkGetMacro(RidgesAndValleys, bool);
+  vtkBooleanMacro(RidgesAndValleys, bool);
+  vtkSetMacro(DemarcatingCurves, bool);
+  vtkGetMacro(DemarcatingCurves, bool);
+  vtkBooleanMacro(DemarcatingCurves, bool);
+  ///@}
+
+  ///@{
+  /** Width of the lines in pixels, antialiased; from 0.1 to 32 (clamped), 1.5 by default. */
+  vtkSetClampMacro(LineWidth, double, .1, 32.);
+  vtkGetMacro(LineWidth, double);
+  ///@}
+
+  ///@{
+  /** Colour of the lines, not lit; black by default. */
+  vtkSetVector3Macro(LineColor, double);
+  vtkGetVector3Macro(LineColor, double);
+  ///@}
+
+  ///@{
+  /** Opacity of the lines over their layer, in [0,1] (clamped); 1 by default. */
+  vtkSetClampMacro(LineOpacity, double, 0., 1.);
+  vtkGetMacro(LineOpacity, double);
+  ///@}
+
+  ///@{
+  /**
+   * The least curvature k of a ridge or valley as s k, with the length s of
+   * vtkBucketedKBufferPass::SetCurvatureScale, and of suggestive contours and demarcating
+   * curves the least change of curvature as s^2 dk/dx. 0.5 by default; 0 shows all, noise
+   * too. Clamped to be >= 0.
+   */
+  vtkSetClampMacro(LineThreshold, double, 0., VTK_DOUBLE_MAX);
+  vtkGetMacro(LineThreshold, double);
+  ///@}
+
+  /** Whether anything is on, and whether lines are. */
   bool HasEffect();
+  bool HasLines();
 
   /** For vtkBucketedKBufferPass: the row of its table, 4 texels of RGBA. */
   std::array<float, 16> GetParameters();
@@ -116,6 +175,14 @@ protected:
   bool CurvatureShading = false;
   bool CurvatureOpacity = false;
   double RadianceScaling = 0.;
+  bool OccludingContours = false;
+  bool SuggestiveContours = false;
+  bool RidgesAndValleys = false;
+  bool DemarcatingCurves = false;
+  double LineWidth = 1.5;
+  double LineColor[3] = { 0., 0., 0. };
+  double LineOpacity = 1.;
+  double LineThreshold = .5;
 
 private:
   vtkSmartPointer<vtkPiecewiseFunction> ShadingFunction;

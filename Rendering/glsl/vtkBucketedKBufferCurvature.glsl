@@ -5,6 +5,9 @@
 // (as Vergne et al. 2009, but in VC lengths). Defined before:
 // vtkBucketedKBufferPixel.glsl.
 
+uniform float ltCurvatureScale; // s, a length
+uniform sampler2D ltParameters; // row: style; vtkCurvatureOpacityProperty::GetParameters
+
 struct ltSurfacePoint
 {
   vec3 position; // VC
@@ -26,10 +29,22 @@ ltSurfacePoint ltPointAt(ivec2 p, uint place)
 
 const ivec2 ltSides[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
 
+// The first fragments of the pixels at ltSides.
+ivec4 ltFirstsAround(ivec2 p)
+{
+  ivec4 firsts;
+  for (int side = 0; side < 4; ++side)
+  {
+    ivec2 q = clamp(p + ltSides[side], ivec2(0), ltSize - 1);
+    firsts[side] = int(texelFetch(ltPixels, q.y * ltSize.x + q.x).x);
+  }
+  return firsts;
+}
+
 // The derivative W of the normal along the surface, n(x + d) = n(x) + W d, by least
 // squares over the neighbours, in tangents t1 and t2: xx, xy (symmetric part), yy. Its
 // trace is k1 + k2: a sphere of radius R with outward normals has 2/R exactly, however
-// large the pixels are. firsts: of the pixels at ltSides in ltPixels.
+// large the pixels are.
 vec3 ltShapeOperator(inout ltSurfacePoint s, ivec2 p, uint place, ivec4 firsts, out vec3 t1,
   out vec3 t2)
 {

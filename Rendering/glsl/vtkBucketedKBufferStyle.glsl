@@ -9,11 +9,11 @@ in vec2 texCoord;
 #if LT_READ_TARGET
 uniform sampler2D ltTarget; // what is behind, premultiplied; else blended by the machine
 #endif
-uniform float ltCurvatureScale; // s, a length
+
 uniform vec2 ltDepthRange;      // of the function's z: distances of 0 and of 1
 uniform sampler2D ltShading;    // factor of the colour over kappa in [-1,1]; row: style
 uniform sampler2D ltOpacity;    // over |kappa| and z; a block of rows per style
-uniform sampler2D ltParameters; // row: style; see vtkBucketedKBufferPass
+
 uniform int ltStyles;
 
 int ltPlaceOfRank[LT_ROOM];
@@ -40,11 +40,11 @@ float ltRadianceScale(float kappa, float delta, float strength)
     (alpha0 + delta * (e - alpha0 * (1.0 + e)));
 }
 
-vec4 ltStylise(vec4 color, uint style, ltSurfacePoint s, vec3 w, vec3 t1, vec3 t2, ivec2 p)
+vec4 ltStylise(vec4 color, uint style, ltSurfacePoint s, float trace, ivec2 p, uint place)
 {
   float row = (float(style) + 0.5) / float(ltStyles);
   vec4 switches = texelFetch(ltParameters, ivec2(0, int(style)), 0);
-  float kappa = ltKappa(s.complete, w.x + w.z);
+  float kappa = ltKappa(s.complete, trace);
   vec3 result = color.rgb;
   float alpha = color.a;
   const float last = 255.0 / 256.0;
@@ -58,7 +58,7 @@ vec4 ltStylise(vec4 color, uint style, ltSurfacePoint s, vec3 w, vec3 t1, vec3 t
   alpha = switches.y > 0.0 ? opacity : alpha;
 #if LT_LINES
   vec4 line = texelFetch(ltParameters, ivec2(2, int(style)), 0);
-  float coverage = ltLineCoverage(s, w, t1, t2, p, style) * line.a;
+  float coverage = ltLineCoverage(s, p, int(place), style) * line.a;
   // The line is a layer over this one.
   float lined = coverage + (1.0 - coverage) * alpha;
   result = (coverage * line.rgb + (1.0 - coverage) * alpha * result) / max(lined, 1e-6);
@@ -76,12 +76,7 @@ void main()
   {
     discard;
   }
-  ivec4 firsts;
-  for (int side = 0; side < 4; ++side)
-  {
-    ivec2 q = clamp(p + ltSides[side], ivec2(0), ltSize - 1);
-    firsts[side] = int(texelFetch(ltPixels, q.y * ltSize.x + q.x).x);
-  }
+  ivec4 firsts = ltFirstsAround(p);
   int count = int(here.y);
   for (int i = 0; i < count; ++i)
   {
@@ -99,7 +94,7 @@ void main()
     vec3 t1;
     vec3 t2;
     vec3 w = ltShapeOperator(s, p, place, firsts, t1, t2);
-    vec4 styled = ltStylise(c, surface.x >> 24u, s, w, t1, t2, p);
+    vec4 styled = ltStylise(c, surface.x >> 24u, s, w.x + w.z, p, place);
     c = surface.y == LT_NO_NORMAL ? c : styled;
 #if LT_CLAMP
     c.rgb = min(c.rgb, vec3(1.0));

@@ -362,6 +362,34 @@ void testOpacity(Suite& suite)
 }
 } // namespace
 
+/** Radiance scaling leaves flat parts, brightens what is convex and faces the eye. */
+void testRadianceScaling(Suite& suite)
+{
+  for (const bool flat : { true, false })
+  {
+    std::vector<unsigned char> pictures[2];
+    for (const double strength : { 0., 1. })
+    {
+      KBufferScene scene(50, 50);
+      Layer square;
+      square.color = { 1., 1., 1., 1. };
+      auto actor = flat ? makeLayer(square) : whiteActor(fineSphere(.4));
+      actor->ForceTranslucentOn();
+      actor->SetPosition(flat ? 0. : .5, flat ? 0. : .5, 0.);
+      actor->GetProperty()->LightingOn();
+      actor->GetProperty()->SetAmbient(.3);
+      actor->GetProperty()->SetDiffuse(0.);
+      scene.renderer->AddActor(actor);
+      scene.pass->SetCurvatureScale(.1); // of the sphere: kappa = -tanh(0.5)
+      scene.pass->GetCurvatureOpacityProperty()->SetRadianceScaling(strength);
+      pictures[strength > 0.] = scene.capture();
+    }
+    const std::size_t middle = 4 * (25 * 50 + 25);
+    const double expected = flat ? 1. : std::exp(std::tanh(.5)); // sigma at delta = 1
+    LT_CHECK_NEAR(suite, double(pictures[1][middle]), expected * pictures[0][middle], 2.);
+  }
+}
+
 int main(int argc, char* argv[])
 {
   if (!canRender())
@@ -374,5 +402,6 @@ int main(int argc, char* argv[])
   testOutline(suite);
   testInvariance(suite);
   testOpacity(suite);
+  testRadianceScaling(suite);
   return suite.result();
 }
