@@ -64,6 +64,16 @@ void blend(int n, float w, const float* a, const float* b, float* LIGHTTRANSPORT
 }
 
 /**
+ * How much of a ray's step lies within the border, which is `inside` (voxels, negative: beyond)
+ * away across the plane, while the ray moves by `slope` per step.
+ */
+double coverage(double inside, double slope)
+{
+  const double moved = std::abs(slope);
+  return moved > 1e-6 ? std::min(1., std::max(0., inside / moved + 0.5)) : (inside > 0. ? 1. : 0.);
+}
+
+/**
  * The n rays of a row cross a plane: `sigma` are n + 1 values, the rays lie a
  * fraction f behind them. U holds the optical depth with a whole step for each
  * plane so far, so that depth = U + step sigma / 2 is the trapezoidal rule's.
@@ -94,6 +104,17 @@ void forget(int n, float w, const float* a, const float* b, float* LIGHTTRANSPOR
   }
 }
 
+/**
+ * v continued by a part t in [0, 1/2] of the way from `far` to `near`, as a depth would be that
+ * grows evenly: near (near / far)^t, the power by its Pade approximant.
+ */
+LIGHTTRANSPORT_INLINE float continued(float t, float near, float far)
+{
+  const float half = 0.5f * (near - far);
+  const float v = near * (far + (1.f + t) * half) / (far + (1.f - t) * half + 1e-30f);
+  return v < 1.f ? v : 1.f;
+}
+
 /** v = exp(-depth), then from n + 1 rays to the n voxels between, a fraction f behind. */
 LIGHTTRANSPORT_SIMD
 void seeRow(int n, float f, const float* depth, float* LIGHTTRANSPORT_RESTRICT e,
@@ -106,6 +127,23 @@ void seeRow(int n, float f, const float* depth, float* LIGHTTRANSPORT_RESTRICT e
   for (int i = 0; i < n; ++i)
   {
     out[i] = f * e[i] + (1.f - f) * e[i + 1];
+  }
+  // A ray beyond the border knows nothing of the outermost voxel.
+  if (f < 0.5f)
+  {
+    out[0] = n > 1 ? continued(f, e[1], e[2]) : e[1];
+  }
+  else if (f > 0.5f)
+  {
+    out[n - 1] = n > 1 ? continued(1.f - f, e[n - 1], e[n - 2]) : e[0];
+  }
+}
+
+void continueRow(int n, float t, const float* near, const float* far, float* out)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    out[i] = continued(t, near[i], far[i]);
   }
 }
 
@@ -351,27 +389,33 @@ struct Scratch
   std::vector<float> sigma;
   std::vector<float> depth;
   std::vector<float> e;
-  std::vector<float> rows; // 2 per direction
-  std::vector<float> v;    // 1 per direction
+  std::vector<float> rows;  // 3 per direction
+  std::vector<float> v;     // 1 per direction
+  std::vector<float> first; // 1 per direction
 
   Scratch(int n, int directions)
     : zeros(n + 4)
     , sigma(n + 4)
     , depth(n + 4)
     , e(n + 4)
-    , rows(std::size_t(2) * directions * n)
+    , rows(std::size_t(3) * directions * n)
     , v(std::size_t(directions) * n)
+    , first(std::size_t(directions) * n)
   {
   }
 };
 
-/** sigma_t at the ray row r of a plane, with zeros around: n + 2 values. */
-const float* SigmaOfRow(const View& view, int k, int r, float g, Scratch& scratch)
+/** sigma_t at the ray row r of a plane, n values from the second on. */
+const float* SigmaOfRow(const View& view, int k, int r, float g, double slope, Scratch& scratch)
 {
-  const float* below = r >= 1 ? view.row(r - 1, k) : scratch.zeros.data();
-  const float* above = r < view.n[1] ? view.row(r, k) : scratch.zeros.data();
-  blend(view.n[0], g, below, above, scratch.sigma.data() + 1);
-  scratch.sigma[view.n[0] + 1] = 0.f;
+  const float* zeros = scratch.zeros.data();
+  const bool first = r == 0;
+  const bool last = r == view.n[1];
+  const float weight = first ? static_cast<float>(coverage(g - 0.5, slope))
+    : last                   ? static_cast<float>(1. - coverage(0.5 - g, slope))
+                             : g;
+  blend(view.n[0], weight, first ? zeros : view.row(r - 1, k), last ? zeros : view.row(r, k),
+    scratch.sigma.data() + 1);
   return scratch.sigma.data();
 }
 
@@ -411,57 +455,103 @@ public:
     }
   }
 
-  /** Plane m, voxel rows [begin, end). */
+  /** Plane m, voxel rows [begin, end); with two rows or more in all, the first two go together. */
   void rows(int m, int begin, int end, int order, bool add, float* sh, std::int64_t shStride,
     Scratch& scratch)
   {
     const int n = this->view.n[0];
+    const int count = this->view.n[1];
     const int k = this->shears[0].plane(this->view, m);
     const int directions = static_cast<int>(this->shears.size());
-    for (int r = begin; r <= end; ++r)
+    const auto rowOf = [&](int d, int r) { return scratch.rows.data() + (3 * d + r % 3) * n; };
+    const auto write = [&](int row, const float* v)
+    {
+      float* out = sh + shStride * (k * this->view.out[2] + row * this->view.out[1]);
+      project(
+        order, n, directions, v, n, this->flatY.data(), add, out, shStride * this->view.out[0]);
+    };
+    // The last row may continue what the two rows of rays before it have.
+    for (int r = begin == count - 1 && begin > 0 ? begin - 1 : begin; r <= end; ++r)
     {
       for (int d = 0; d < directions; ++d)
       {
-        const Shear& shear = this->shears[d];
-        const float f = shear.frac(0, m);
-        const float g = shear.frac(1, m);
-        const float* sigma = SigmaOfRow(this->view, k, r, g, scratch);
-        const float* before = this->stateRow(this->state, 2, d, m - 1, r - shear.moved(1, m));
-        before = before ? before - shear.moved(0, m) : scratch.zeros.data() + 1;
-        // The row at `end` belongs to the next task: it is needed here, but not kept.
-        const bool own = r < end || r == this->view.n[1];
-        float* U = own ? this->stateRow(this->state, 2, d, m, r) : scratch.e.data() + 1;
-        float* depth = scratch.depth.data();
-        crossPlane(n + 1, f, shear.step, sigma, before, U, depth);
-        if (!this->reach.empty())
+        this->crossRow(m, k, d, r, r >= begin && (r < end || r == count), rowOf(d, r), scratch);
+      }
+      if (r <= begin)
+      {
+        continue;
+      }
+      for (int d = 0; d < directions; ++d)
+      {
+        const float g = this->shears[d].frac(1, m);
+        float* v = scratch.v.data() + d * n;
+        float* first = scratch.first.data() + d * n;
+        if (r == 1 && (g >= 0.5f || count == 1))
         {
-          if (own)
-          {
-            std::copy(depth, depth + n + 1, this->stateRow(this->past, this->planes, d, m, r));
-          }
-          if (this->reach[d] >= 0.)
-          {
-            this->forgetRow(d, m, r, depth, scratch);
-          }
+          blend(n, g < 0.5f ? 1.f : (count == 1 && g > 0.5f ? 0.f : 1.f - g), rowOf(d, 0),
+            rowOf(d, 1), first);
         }
-        float* rows = scratch.rows.data() + std::ptrdiff_t(2) * d * n;
-        seeRow(n, f, depth, scratch.e.data(), rows + (r & 1) * n);
-        if (r > begin)
+        else if (r == 2 && g < 0.5f)
         {
-          blend(n, 1.f - g, rows + ((r - 1) & 1) * n, rows + (r & 1) * n,
-            scratch.v.data() + std::ptrdiff_t(d) * n);
+          continueRow(n, g, rowOf(d, 1), rowOf(d, 2), first);
+        }
+        if (r > 1 && r == count && g > 0.5f)
+        {
+          continueRow(n, 1.f - g, rowOf(d, r - 1), rowOf(d, r - 2), v);
+        }
+        else if (r > 1)
+        {
+          blend(n, 1.f - g, rowOf(d, r - 1), rowOf(d, r), v);
         }
       }
-      if (r > begin)
+      if ((r == 2 && begin == 0) || count == 1)
       {
-        float* out = sh + shStride * (k * this->view.out[2] + (r - 1) * this->view.out[1]);
-        project(order, n, directions, scratch.v.data(), n, this->flatY.data(), add, out,
-          shStride * this->view.out[0]);
+        write(0, scratch.first.data());
+      }
+      if (r > 1)
+      {
+        write(r - 1, scratch.v.data());
       }
     }
   }
 
 private:
+  /** The rays of row r meet plane m (k); v at the voxels' columns goes to `seen`. */
+  void crossRow(int m, int k, int d, int r, bool own, float* seen, Scratch& scratch)
+  {
+    const int n = this->view.n[0];
+    const Shear& shear = this->shears[d];
+    const float f = shear.frac(0, m);
+    const float* sigma = SigmaOfRow(this->view, k, r, shear.frac(1, m), shear.shift[1], scratch);
+    const float* before = this->stateRow(this->state, 2, d, m - 1, r - shear.moved(1, m));
+    before = before ? before - shear.moved(0, m) : scratch.zeros.data() + 1;
+    // A row of another task is needed here, but not kept.
+    float* U = own ? this->stateRow(this->state, 2, d, m, r) : scratch.e.data() + 1;
+    float* depth = scratch.depth.data();
+    crossPlane(n + 1, f, shear.step, sigma, before, U, depth);
+    // The outermost rays: within the border as dense as the outermost voxel.
+    for (const int edge : { 0, n })
+    {
+      const double inside = edge == 0 ? f - 0.5 : 0.5 - f;
+      const float s = shear.step * sigma[edge == 0 ? 1 : n] *
+        static_cast<float>(coverage(inside, shear.shift[0]));
+      depth[edge] = before[edge] + 0.5f * s;
+      U[edge] = before[edge] + s;
+    }
+    if (!this->reach.empty())
+    {
+      if (own)
+      {
+        std::copy(depth, depth + n + 1, this->stateRow(this->past, this->planes, d, m, r));
+      }
+      if (this->reach[d] >= 0.)
+      {
+        this->forgetRow(d, m, r, depth, scratch);
+      }
+    }
+    seeRow(n, f, depth, scratch.e.data(), seen);
+  }
+
   /** Ray 0 of a row; null where there is none yet. A zero lies on either side. */
   float* stateRow(Buffer<float>& buffer, int depth, int d, int m, int r)
   {
@@ -731,7 +821,16 @@ private:
       for (int i = i0; i < i1; ++i)
       {
         // `line` has a zero before and after the row.
-        Locate(this->light[0] + rays.at(i) * z + 1., n, at[i], w[i]);
+        const double x = this->light[0] + rays.at(i) * z;
+        Locate(x + 1., n, at[i], w[i]);
+        if (x < 0.)
+        {
+          w[i] = static_cast<float>(coverage(x + 0.5, rays.at(i)));
+        }
+        else if (x > n - 1.)
+        {
+          w[i] = static_cast<float>(1. - coverage(n - 0.5 - x, rays.at(i)));
+        }
       }
       for (int r = 0; r < height; ++r)
       {
@@ -745,7 +844,11 @@ private:
           return j >= 0. && j < this->view.n[1] ? this->view.row(static_cast<int>(j), k)
                                                 : zeros.data();
         };
-        blend(n, static_cast<float>(y - low), row(low), row(low + 1.), line.data() + 1);
+        const double last = this->view.n[1] - 1.;
+        const double weight = y < 0. ? coverage(y + 0.5, rows.at(begin + r))
+          : y > last                 ? 1. - coverage(last + 0.5 - y, rows.at(begin + r))
+                                     : y - low;
+        blend(n, static_cast<float>(weight), row(low), row(low + 1.), line.data() + 1);
         line[0] = 0.f;
         line[n + 1] = 0.f;
         gather(i1 - i0, at.data() + i0, w.data() + i0, line.data(), sigma.data());
@@ -765,6 +868,26 @@ private:
       }
       isFirst = false;
       this->seePlane(rays, rows, begin, end, k, z, e, line, rayAt, rayW, seen, v, stride);
+    }
+  }
+
+  /**
+   * The ray before a voxel and the weight of the next. At the border, where one of the two would
+   * lie beyond it, the two rays within: their line is continued, with a weight outside [0, 1].
+   */
+  void between(int a, int voxel, double z, const Slopes& rays, int& ray, float& w) const
+  {
+    Locate(rays.ray((voxel - this->light[a]) / z), rays.n - 2, ray, w);
+    if (voxel == 0 && ray < rays.n - 2 && this->light[a] + rays.at(ray) * z < -0.5)
+    {
+      ++ray;
+      w -= 1.f;
+    }
+    else if (voxel == this->view.n[a] - 1 && ray > 0 &&
+      this->light[a] + rays.at(ray + 1) * z > this->view.n[a] - 0.5)
+    {
+      --ray;
+      w += 1.f;
     }
   }
 
@@ -791,7 +914,7 @@ private:
     {
       int r;
       float g;
-      Locate(rows.ray((j - this->light[1]) / z), rows.n - 2, r, g);
+      this->between(1, j, z, rows, r, g);
       if (r < begin || r >= end)
       {
         continue;
@@ -800,11 +923,12 @@ private:
       {
         for (int i = i0; i <= i1; ++i)
         {
-          Locate(rays.ray((i - this->light[0]) / z), rays.n - 2, rayAt[i - i0], rayW[i - i0]);
+          this->between(0, i, z, rays, rayAt[i - i0], rayW[i - i0]);
         }
         located = true;
-        from = i0 <= i1 ? rayAt[0] : 0;
-        to = i0 <= i1 ? rayAt[i1 - i0] + 2 : 0;
+        const auto ends = std::minmax_element(rayAt.begin(), rayAt.begin() + (i1 - i0 + 1));
+        from = i0 <= i1 ? *ends.first : 0;
+        to = i0 <= i1 ? *ends.second + 2 : 0;
       }
       const float* lower = e.data() + width * (r - begin) + from;
       blend(to - from, g, lower, lower + width, line.data() + from);
@@ -812,7 +936,7 @@ private:
       float* out = v + stride * (k * this->view.out[2] + j * this->view.out[1]);
       for (int i = i0; i <= i1; ++i)
       {
-        out[i * stride * this->view.out[0]] = seen[i - i0];
+        out[i * stride * this->view.out[0]] = std::min(1.f, std::max(0.f, seen[i - i0]));
       }
     }
   }

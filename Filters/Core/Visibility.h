@@ -29,9 +29,9 @@ namespace lighttransport
  * that each of its rays meets all planes and depth is added up along the ray
  * itself: only sigma_t is interpolated on the way (bilinearly in each plane,
  * trapezoidal rule between planes), and v once, at the end, from the four rays
- * around the voxel. Nothing diffuses, however far the sweep goes. Beyond the
- * outermost voxels sigma_t falls linearly to 0 over one spacing, which has the
- * integral of a medium that ends half a spacing beyond them.
+ * around the voxel. Nothing diffuses, however far the sweep goes. The medium ends half
+ * a spacing beyond the outermost voxels and is there as dense as they are; rays beyond
+ * do not count for the outermost voxels, to which those within are continued.
  */
 struct VisibilityMedium
 {
@@ -111,8 +111,8 @@ bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<dou
  * result, and a transposed copy of sigma_t. Throws std::bad_alloc.
  */
 bool VisibilitySH(const VisibilityMedium& medium, const std::array<std::array<double, 3>, 3>& axes,
-  const DirectionSet& directions, int order, float* sh, std::int64_t stride, const ParallelFor& parallel,
-  const ProgressFunction& progress);
+  const DirectionSet& directions, int order, float* sh, std::int64_t stride,
+  const ParallelFor& parallel, const ProgressFunction& progress);
 } // namespace lighttransport
 
 #endif
