@@ -9,6 +9,7 @@ from the engine and the turbine blade of ../shared/data; without them the functi
 
 import os
 import sys
+import time
 
 import lighttransport as lt
 from vtkmodules import vtkRenderingOpenGL2, vtkRenderingVolumeOpenGL2  # noqa: F401
@@ -82,6 +83,9 @@ def show(prop, position, up, zoom, name):
     camera.Zoom(zoom)
     renderer.ResetCameraClippingRange()
     window.Render()
+    begin = time.perf_counter()
+    window.Render()
+    print(f"{name}: {1e3 * (time.perf_counter() - begin):.0f} ms")
     shot = vtkWindowToImageFilter()
     shot.SetInput(window)
     shot.ReadFrontBufferOff()

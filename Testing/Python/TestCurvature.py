@@ -9,6 +9,7 @@ from lighttransport import (
     vtkCurvatureOpacityFunction,
     vtkSurfaceCurvatureFilter,
     vtkVolumeCurvatureFilter,
+    vtkVolumeCurvatureProperty,
 )
 from vtkmodules.vtkCommonCore import VTK_FLOAT
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction, vtkPolyData
@@ -74,3 +75,12 @@ again = vtkCurvatureOpacityFunction()
 again.SetKindToTable()
 again.SetTableImage(table)
 assert abs(again.Evaluate(-0.3, 0.5) - (0.1 + 0.8 * 0.3)) < 1e-6
+
+# What the volume mapper is told; nothing is drawn here.
+how = vtkVolumeCurvatureProperty()
+assert how.GetOpacityFunction().GetKind() == vtkCurvatureOpacityFunction.CurvatureOnly
+time = how.GetMTime()
+how.GetOpacityFunction().SetMinimumOpacity(0.2)
+assert how.GetMTime() > time
+how.SetStrength(2.0)
+assert how.GetStrength() == 1.0

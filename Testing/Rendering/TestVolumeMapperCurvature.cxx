@@ -7,15 +7,19 @@
  */
 #include "VolumeMapperScene.h"
 
+#include "vtkActor.h"
 #include "vtkContourValues.h"
 #include "vtkCurvatureOpacityFunction.h"
 #include "vtkMatrix3x3.h"
+#include "vtkPlaneSource.h"
+#include "vtkPolyDataMapper.h"
+#include "vtkProperty.h"
 #include "vtkTrivialProducer.h"
 #include "vtkVolumeCurvatureFilter.h"
 #include "vtkVolumeCurvatureProperty.h"
 #include "vtkVolumeLightingProperty.h"
 
-#include <limits>
+#include <cstdio>
 
 using namespace lighttransport::testing;
 using Function = vtkCurvatureOpacityFunction;
@@ -293,6 +297,149 @@ void depth(Suite& suite)
   LT_CHECK(suite, openGLErrors().empty());
 }
 
+/** An image that is turned by its direction matrix, and the camera with it: the same picture. */
+void oriented(Suite& suite)
+{
+  Picture pictures[2];
+  for (int turned = 0; turned < 2; ++turned)
+  {
+    auto image = makeGrid(N, 25, 21);
+    image->SetSpacing(1., 1.2, 1.5);
+    vtkNew<vtkFloatArray> array;
+    for (vtkIdType i = 0; i < image->GetNumberOfPoints(); ++i)
+    {
+      double p[3]; // before it is turned
+      image->GetPoint(i, p);
+      array->InsertNextValue(
+        static_cast<float>(std::hypot(p[0] - 15., 1.3 * (p[1] - 14.), p[2] - 16.)));
+    }
+    image->GetPointData()->SetScalars(array);
+    if (turned)
+    {
+      // x becomes y, y becomes -x.
+      vtkNew<vtkMatrix3x3> direction;
+      const double m[9] = { 0., -1., 0., 1., 0., 0., 0., 0., 1. };
+      direction->DeepCopy(m);
+      image->SetDirectionMatrix(direction);
+    }
+    LitScene scene(image, Size, Size);
+    makeWhite(scene, 0.6);
+    showIsosurfaces(scene, { 6., 10. });
+    scene.mapper->SetSampleDistance(0.2F);
+    vtkNew<vtkVolumeCurvatureFilter> filter;
+    filter->SetInputData(image);
+    filter->InsideIsBrightOff();
+    vtkNew<vtkVolumeCurvatureProperty> property;
+    property->GetOpacityFunction()->SetKindToWideDepth();
+    scene.mapper->SetCurvatureProperty(property);
+    scene.mapper->SetCurvatureFieldConnection(filter->GetOutputPort());
+    scene.look(turned ? Point{ .6, -1., .5 } : Point{ -1., -.6, .5 }, true);
+    pictures[turned] = scene.capture();
+  }
+  const Difference apart = difference(pictures[0], pictures[1]);
+  LT_CHECK(suite, apart.mean < 0.5 && apart.fractionDiffering < 0.01);
+  LT_CHECK(suite, regionMean(pictures[0], 0, 0, Size - 1, Size - 1)[0] > 10.);
+}
+
+/**
+ * Three translucent squares in a homogeneous medium, each seen through what lies before it,
+ * by VTK's depth peeling for volumes.
+ */
+void betweenSurfaces(Suite& suite)
+{
+  LitScene scene(volumeOf([](const Point&) { return 50.; }), 17, 17);
+  makeWhite(scene, 0.05);
+  scene.mapper->SetSampleDistance(0.05F);
+  scene.renderer->SetUseDepthPeeling(true);
+  scene.renderer->SetUseDepthPeelingForVolumes(true);
+  scene.renderer->SetMaximumNumberOfPeels(20);
+  scene.renderer->SetOcclusionRatio(0.);
+  scene.window->SetAlphaBitPlanes(true);
+  const double places[3] = { 5., 13., 22. };
+  for (int i = 0; i < 3; ++i)
+  {
+    vtkNew<vtkPlaneSource> square;
+    square->SetOrigin(-40., -40., places[i]);
+    square->SetPoint1(80., -40., places[i]);
+    square->SetPoint2(-40., 80., places[i]);
+    vtkNew<vtkPolyDataMapper> mapper;
+    mapper->SetInputConnection(square->GetOutputPort());
+    vtkNew<vtkActor> actor;
+    actor->SetMapper(mapper);
+    actor->GetProperty()->LightingOff();
+    actor->GetProperty()->SetColor(i == 0, i == 1, i == 2);
+    actor->GetProperty()->SetOpacity(0.4);
+    scene.renderer->AddActor(actor);
+  }
+  vtkNew<vtkVolumeCurvatureProperty> property;
+  property->SetOpacityFunction(constant(0.5));
+  for (int curved = 0; curved < 2; ++curved)
+  {
+    scene.mapper->SetCurvatureProperty(curved ? property.Get() : nullptr);
+    for (double side : { -1., 1. })
+    {
+      scene.look({ 0., 0., side }, true);
+      Color expected = { 0., 0., 0. };
+      double clear = 1.;
+      double at = side < 0. ? 0. : 32.;
+      for (int step = 0; step < 4; ++step)
+      {
+        const int i = side < 0. ? step : 2 - step;
+        const double next = step == 3 ? (side < 0. ? 32. : 0.) : places[i];
+        const double through = std::pow(0.95, std::abs(next - at) * (curved ? 0.5 : 1.));
+        at = next;
+        for (double& channel : expected)
+        {
+          channel += clear * (1. - through) * 255.;
+        }
+        clear *= through;
+        if (step < 3)
+        {
+          expected[i] += clear * 0.4 * 255.;
+          clear *= 0.6;
+        }
+      }
+      const Picture picture = scene.capture();
+      for (int c = 0; c < 3; ++c)
+      {
+        LT_CHECK_NEAR(suite, pixel(picture, 8, 8)[c], expected[c], 1.5);
+      }
+    }
+  }
+  LT_CHECK(suite, openGLErrors().empty());
+}
+
+/** A camera that turns by small steps changes the picture by small steps. */
+void turning(Suite& suite)
+{
+  LitScene scene(
+    volumeOf([](const Point& p) { return std::hypot(p[0] - 16., p[1] - 16., p[2] - 13.); }), Size,
+    Size);
+  makeWhite(scene, 0.4);
+  showIsosurfaces(scene, { 5., 10. });
+  scene.mapper->SetSampleDistance(0.2F);
+  vtkNew<vtkVolumeCurvatureProperty> property;
+  property->GetOpacityFunction()->SetKindToWideDepth();
+  scene.mapper->SetCurvatureProperty(property);
+  scene.look({ -1., -.6, .5 });
+  Picture before = scene.capture();
+  double largest = 0.;
+  double sum = 0.;
+  const int steps = 10;
+  for (int i = 0; i < steps; ++i)
+  {
+    // Through the diagonals of the box, where its nearest corner changes.
+    scene.renderer->GetActiveCamera()->Azimuth(3.);
+    const Picture now = scene.capture();
+    const double change = difference(before, now).mean;
+    largest = std::max(largest, change);
+    sum += change;
+    before = now;
+  }
+  std::printf("3 degrees change the mean by %.3f, at most %.3f\n", sum / steps, largest);
+  LT_CHECK(suite, sum > 0. && largest < 2. * sum / steps);
+}
+
 /** With light and with a filter as producer; errors are one each, and the picture remains. */
 void together(Suite& suite)
 {
@@ -376,6 +523,9 @@ int main(int argc, char* argv[])
   field(suite);
   alongRay(suite);
   depth(suite);
+  oriented(suite);
+  betweenSurfaces(suite);
+  turning(suite);
   together(suite);
   return suite.result();
 }
