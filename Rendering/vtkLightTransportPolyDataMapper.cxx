@@ -39,6 +39,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -103,24 +104,23 @@ void Gather(vtkDataArray* array, int first, const double factors[4], std::vector
     }
   }
 }
-} // namespace
-
 //------------------------------------------------------------------------------
-class vtkLightTransportPolyDataMapper::Implementation
+/**
+ * A visibility in a window: all mappers that show it there share its sweeps and textures.
+ */
+class SharedVisibility
 {
 public:
   vtkSmartPointer<vtkAlgorithm> Producer;
   int Port = 0;
   vtkSmartPointer<vtkProp3D> Volume;
-  std::string Reported;
+  vtkOpenGLRenderWindow* Window = nullptr; // compared, never used
 
   // The frame's.
-  bool Active = false;
   int Textures = 0;          // of harmonics
   std::vector<int> Channels; // of each light that is on: its exact field, or -1
   int Exact = 0;
   std::string Defines;
-  std::map<const vtkOpenGLHelper*, std::string> Built; // with which each primitive was
   vtkNew<vtkMatrix4x4> WorldToGC;
   vtkNew<vtkMatrix4x4> WorldToDC;
 
@@ -133,18 +133,20 @@ public:
   // On the GPU.
   vtkNew<vtkTextureObject> Harmonics[MostTextures];
   vtkNew<vtkTextureObject> ExactTexture;
-  vtkOpenGLRenderWindow* Window = nullptr; // compared, never used
   vtkSmartPointer<vtkDataArray> UploadedHarmonics;
   vtkMTimeType UploadedHarmonicsTime = 0;
   vtkSmartPointer<vtkDataArray> UploadedExact;
   vtkMTimeType UploadedExactTime = 0;
   int Uploads = 0;
 
-  Implementation()
+  SharedVisibility()
   {
     this->Filter->SphericalHarmonicsOff();
     this->Filter->SetInputData(this->Medium);
   }
+
+  static std::shared_ptr<SharedVisibility> Find(
+    vtkAlgorithm* producer, int port, vtkProp3D* volume, vtkOpenGLRenderWindow* window);
 
   void Release(vtkWindow* window)
   {
@@ -155,19 +157,45 @@ public:
     this->ExactTexture->ReleaseGraphicsResources(window);
     this->UploadedHarmonics = nullptr;
     this->UploadedExact = nullptr;
-    this->Window = nullptr;
-    this->Active = false;
   }
 
+  std::string Prepare(vtkRenderer* renderer);
+
+private:
   void FindLights(vtkRenderer* renderer, bool exact, vtkMatrix4x4* worldToData);
   std::string UpdateExact(vtkImageData* image);
-  std::string Prepare(vtkRenderer* renderer);
 };
 
 //------------------------------------------------------------------------------
+std::shared_ptr<SharedVisibility> SharedVisibility::Find(
+  vtkAlgorithm* producer, int port, vtkProp3D* volume, vtkOpenGLRenderWindow* window)
+{
+  // Rendering has one thread.
+  static std::vector<std::weak_ptr<SharedVisibility>> all;
+  all.erase(std::remove_if(all.begin(), all.end(),
+              [](const std::weak_ptr<SharedVisibility>& one) { return one.expired(); }),
+    all.end());
+  for (const std::weak_ptr<SharedVisibility>& one : all)
+  {
+    std::shared_ptr<SharedVisibility> shared = one.lock();
+    if (shared->Producer == producer && shared->Port == port && shared->Volume == volume &&
+      shared->Window == window)
+    {
+      return shared;
+    }
+  }
+  auto shared = std::make_shared<SharedVisibility>();
+  shared->Producer = producer;
+  shared->Port = port;
+  shared->Volume = volume;
+  shared->Window = window;
+  all.push_back(shared);
+  return shared;
+}
+
+//------------------------------------------------------------------------------
 /** In the order in which VTK numbers them: those that are on. */
-void vtkLightTransportPolyDataMapper::Implementation::FindLights(
-  vtkRenderer* renderer, bool exact, vtkMatrix4x4* worldToData)
+void SharedVisibility::FindLights(vtkRenderer* renderer, bool exact, vtkMatrix4x4* worldToData)
 {
   this->Channels.clear();
   std::vector<std::array<double, 4>> lights;
@@ -227,7 +255,7 @@ void vtkLightTransportPolyDataMapper::Implementation::FindLights(
 }
 
 //------------------------------------------------------------------------------
-std::string vtkLightTransportPolyDataMapper::Implementation::UpdateExact(vtkImageData* image)
+std::string SharedVisibility::UpdateExact(vtkImageData* image)
 {
   vtkDataArray* extinction = image->GetPointData()->GetArray(vtkLightTransportArrays::Extinction);
   if (extinction != this->Extinction || image->GetMTime() > this->Medium->GetMTime())
@@ -249,14 +277,9 @@ std::string vtkLightTransportPolyDataMapper::Implementation::UpdateExact(vtkImag
 }
 
 //------------------------------------------------------------------------------
-std::string vtkLightTransportPolyDataMapper::Implementation::Prepare(vtkRenderer* renderer)
+std::string SharedVisibility::Prepare(vtkRenderer* renderer)
 {
-  auto* window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow());
-  if (this->Window != window)
-  {
-    this->Release(this->Window);
-    this->Window = window;
-  }
+  vtkOpenGLRenderWindow* window = this->Window;
   this->Producer->Update(this->Port);
   auto* image = vtkImageData::SafeDownCast(this->Producer->GetOutputDataObject(this->Port));
   if (!image || image->GetNumberOfPoints() < 1)
@@ -386,6 +409,22 @@ std::string vtkLightTransportPolyDataMapper::Implementation::Prepare(vtkRenderer
   this->Defines = defines.str() + "\n";
   return {};
 }
+} // namespace
+
+//------------------------------------------------------------------------------
+class vtkLightTransportPolyDataMapper::Implementation
+{
+public:
+  vtkSmartPointer<vtkAlgorithm> Producer;
+  int Port = 0;
+  vtkSmartPointer<vtkProp3D> Volume;
+  std::string Reported;
+
+  std::shared_ptr<SharedVisibility> Shared;
+  bool Active = false;
+  std::string Defines;                                 // the frame's
+  std::map<const vtkOpenGLHelper*, std::string> Built; // with which each primitive was
+};
 
 //------------------------------------------------------------------------------
 vtkLightTransportPolyDataMapper::vtkLightTransportPolyDataMapper()
@@ -432,7 +471,7 @@ vtkProp3D* vtkLightTransportPolyDataMapper::GetVolume()
 //------------------------------------------------------------------------------
 int vtkLightTransportPolyDataMapper::GetNumberOfVisibilityUploads()
 {
-  return this->Internal->Uploads;
+  return this->Internal->Shared ? this->Internal->Shared->Uploads : 0;
 }
 
 //------------------------------------------------------------------------------
@@ -453,25 +492,25 @@ void vtkLightTransportPolyDataMapper::RenderPieceStart(vtkRenderer* renderer, vt
 {
   Implementation& internal = *this->Internal;
   internal.Active = false;
+  internal.Defines.clear();
   if (internal.Producer && (this->ShadowStrength > 0. || this->AmbientOcclusion > 0.))
   {
-    const std::string problem = internal.Prepare(renderer);
+    internal.Shared = SharedVisibility::Find(internal.Producer, internal.Port, internal.Volume,
+      vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()));
+    const std::string problem = internal.Shared->Prepare(renderer);
     this->ReportOnce(problem);
     internal.Active = problem.empty();
   }
-  if (!internal.Active)
+  if (internal.Active)
   {
-    internal.Defines.clear();
-  }
-  else
-  {
-    for (int t = 0; t < internal.Textures; ++t)
+    internal.Defines = internal.Shared->Defines;
+    for (int t = 0; t < internal.Shared->Textures; ++t)
     {
-      internal.Harmonics[t]->Activate();
+      internal.Shared->Harmonics[t]->Activate();
     }
-    if (internal.Exact > 0)
+    if (internal.Shared->Exact > 0)
     {
-      internal.ExactTexture->Activate();
+      internal.Shared->ExactTexture->Activate();
     }
   }
   this->Superclass::RenderPieceStart(renderer, actor);
@@ -484,13 +523,13 @@ void vtkLightTransportPolyDataMapper::RenderPieceFinish(vtkRenderer* renderer, v
   Implementation& internal = *this->Internal;
   if (internal.Active)
   {
-    for (int t = 0; t < internal.Textures; ++t)
+    for (int t = 0; t < internal.Shared->Textures; ++t)
     {
-      internal.Harmonics[t]->Deactivate();
+      internal.Shared->Harmonics[t]->Deactivate();
     }
-    if (internal.Exact > 0)
+    if (internal.Shared->Exact > 0)
     {
-      internal.ExactTexture->Deactivate();
+      internal.Shared->ExactTexture->Deactivate();
     }
   }
 }
@@ -498,7 +537,12 @@ void vtkLightTransportPolyDataMapper::RenderPieceFinish(vtkRenderer* renderer, v
 //------------------------------------------------------------------------------
 void vtkLightTransportPolyDataMapper::ReleaseGraphicsResources(vtkWindow* window)
 {
-  this->Internal->Release(window);
+  if (this->Internal->Shared)
+  {
+    this->Internal->Shared->Release(window);
+    this->Internal->Shared = nullptr;
+  }
+  this->Internal->Active = false;
   this->Internal->Built.clear();
   this->Superclass::ReleaseGraphicsResources(window);
 }
@@ -524,6 +568,7 @@ void vtkLightTransportPolyDataMapper::ReplaceShaderLight(
   const int count = this->PrimitiveInfo[this->LastBoundBO].LastLightCount;
   if (internal.Active && complexity > 0 && count > 0)
   {
+    const std::vector<int>& channels = internal.Shared->Channels;
     // The colour of each light, under another name, times its visibility. VTK puts its own
     // lighting in the tag's place.
     std::ostringstream before;
@@ -532,8 +577,7 @@ void vtkLightTransportPolyDataMapper::ReplaceShaderLight(
               "  ambientColor *= ltOcclusion(ltPlace);\n";
     for (int i = 0; i < count; ++i)
     {
-      const int channel =
-        i < static_cast<int>(internal.Channels.size()) ? internal.Channels[i] : -1;
+      const int channel = i < static_cast<int>(channels.size()) ? channels[i] : -1;
       const std::string l = "ltL" + std::to_string(i);
       const std::string direction = "-lightDirectionVC" + std::to_string(i);
       before << "  vec3 " << l << " = "
@@ -592,8 +636,8 @@ void vtkLightTransportPolyDataMapper::SetMapperShaderParameters(
       program->SetUniformMatrix(name, fromView);
     }
   };
-  matrix("in_ltViewToGC", internal.WorldToGC);
-  matrix("in_ltViewToDC", internal.WorldToDC);
+  matrix("in_ltViewToGC", internal.Shared->WorldToGC);
+  matrix("in_ltViewToDC", internal.Shared->WorldToDC);
   const auto sampler = [&](const std::string& name, vtkTextureObject* texture)
   {
     if (program->IsUniformUsed(name.c_str()))
@@ -601,11 +645,11 @@ void vtkLightTransportPolyDataMapper::SetMapperShaderParameters(
       program->SetUniformi(name.c_str(), texture->GetTextureUnit());
     }
   };
-  for (int t = 0; t < internal.Textures; ++t)
+  for (int t = 0; t < internal.Shared->Textures; ++t)
   {
-    sampler("in_ltVisibility" + std::to_string(t), internal.Harmonics[t]);
+    sampler("in_ltVisibility" + std::to_string(t), internal.Shared->Harmonics[t]);
   }
-  sampler("in_ltExact", internal.ExactTexture);
+  sampler("in_ltExact", internal.Shared->ExactTexture);
 }
 
 //------------------------------------------------------------------------------
@@ -617,5 +661,5 @@ void vtkLightTransportPolyDataMapper::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ShadowStrength: " << this->ShadowStrength << "\n";
   os << indent << "AmbientOcclusion: " << this->AmbientOcclusion << "\n";
   os << indent << "SurfaceOffset: " << this->SurfaceOffset << "\n";
-  os << indent << "VisibilityUploads: " << this->Internal->Uploads << "\n";
+  os << indent << "VisibilityUploads: " << this->GetNumberOfVisibilityUploads() << "\n";
 }

@@ -29,6 +29,8 @@
  *   volumeMapper->SetVisibilityConnection(visibility->GetOutputPort()); // the same for it
  * @endcode
  *
+ * Mappers with the same connection and volume share sweeps and textures in a window.
+ *
  * The arrays have one channel: RGB extinction is refused. A problem is reported once,
  * by vtkErrorMacro, and the surface then drawn without shadows. The picture is VTK's
  * own, to the pixel, without a visibility and with ShadowStrength and
@@ -101,7 +103,10 @@ public:
   vtkGetMacro(SurfaceOffset, double);
   ///@}
 
-  /** How often textures were uploaded: nothing is when nothing changed. */
+  /**
+   * How often the visibility was uploaded, for all mappers that share it: nothing is when nothing
+   * changed.
+   */
   int GetNumberOfVisibilityUploads();
 
   void RenderPieceStart(vtkRenderer* renderer, vtkActor* actor) override;

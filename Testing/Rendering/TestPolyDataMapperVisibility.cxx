@@ -411,6 +411,22 @@ void updates(Suite& suite)
   scene.light->SetPosition(1., 0., 1.);
   scene.middle();
   LT_CHECK(suite, scene.mapper->GetNumberOfVisibilityUploads() == 3);
+  // A second surface uploads nothing.
+  {
+    vtkNew<vtkLightTransportPolyDataMapper> second;
+    second->SetInputConnection(scene.plane->GetOutputPort());
+    second->SetVisibilityConnection(scene.filter->GetOutputPort());
+    vtkNew<vtkActor> actor;
+    actor->SetMapper(second);
+    actor->SetPosition(0., 0., -3.);
+    scene.renderer->AddActor(actor);
+    scene.middle();
+    LT_CHECK(suite, second->GetNumberOfVisibilityUploads() == 3);
+    scene.renderer->RemoveActor(actor);
+    scene.middle();
+    LT_CHECK(suite, scene.mapper->GetNumberOfVisibilityUploads() >= 3);
+    LT_CHECK(suite, openGLErrors().empty());
+  }
   // Lights come and go; five scene lights: the fifth in the harmonics.
   std::vector<vtkSmartPointer<vtkLight>> more;
   for (int i = 0; i < 4; ++i)
