@@ -1,0 +1,266 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * Frame time and quality of vtkLightTransportVolumeMapper's lighting with three
+ * scene lights, against the stock mapper shaded by the same three, and against
+ * rays traced in the shader, all in one run:
+ *
+ *   bench-lighting [-n 64] [-w 512] [-f 5] [-d FOLDER]
+ *   bench-lighting --psnr A.png B.png
+ *
+ * n^3 points, w^2 pixels, medians of f frames between which the camera turns a
+ * little. With a folder, the volume and the pictures are written there, for
+ * bench-lighting.sh, which has VTK 9.2's secondary rays draw the same scene; the
+ * quality is that of the medium alone there (no gradient is a surface), which is
+ * what those rays compute. The exit code is 0 whatever the times are.
+ */
+#include "LightTransportRenderingTesting.h"
+
+#include "vtkCamera.h"
+#include "vtkColorTransferFunction.h"
+#include "vtkLight.h"
+#include "vtkLightTransportVolumeMapper.h"
+#include "vtkOpenGLGPUVolumeRayCastMapper.h"
+#include "vtkPiecewiseFunction.h"
+#include "vtkRenderer.h"
+#include "vtkSmartPointer.h"
+#include "vtkVolume.h"
+#include "vtkVolumeLightingProperty.h"
+#include "vtkVolumeProperty.h"
+#include "vtkXMLImageDataWriter.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <vector>
+
+using namespace lighttransport::testing;
+
+namespace
+{
+/** bench-frame's ball: soft, with waves in it, on [-1,1]^3; grey 0..255. */
+vtkSmartPointer<vtkImageData> makeVolume(int n)
+{
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(n, n, n);
+  image->SetOrigin(-1., -1., -1.);
+  image->SetSpacing(2. / (n - 1), 2. / (n - 1), 2. / (n - 1));
+  image->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
+  auto* grey = static_cast<unsigned char*>(image->GetScalarPointer());
+  for (vtkIdType i = 0; i < image->GetNumberOfPoints(); ++i)
+  {
+    double p[3];
+    image->GetPoint(i, p);
+    const double r = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+    grey[i] = static_cast<unsigned char>(
+      r > .9 ? 0. : 120. + 100. * std::sin(12. * p[0]) * std::sin(9. * p[1]) * r);
+  }
+  return image;
+}
+
+struct View
+{
+  vtkNew<vtkRenderWindow> window;
+  vtkNew<vtkRenderer> renderer;
+  vtkNew<vtkVolume> volume;
+
+  View(vtkGPUVolumeRayCastMapper* mapper, vtkImageData* image, vtkVolumeProperty* property,
+    int pixels)
+  {
+    mapper->SetInputData(image);
+    mapper->AutoAdjustSampleDistancesOff();
+    mapper->SetSampleDistance(static_cast<float>(image->GetSpacing()[0]));
+    this->volume->SetMapper(mapper);
+    this->volume->SetProperty(property);
+    this->renderer->AddVolume(this->volume);
+    this->window->SetSize(pixels, pixels);
+    this->window->AddRenderer(this->renderer);
+    this->window->SetMultiSamples(0);
+    const double lights[3][6] = { { -1., .5, 1., 1., .9, .8 }, { 1., 1., .2, .5, .6, 1. },
+      { 0., -1., .5, .6, .6, .6 } };
+    for (const auto& l : lights)
+    {
+      vtkNew<vtkLight> light;
+      light->SetLightTypeToSceneLight();
+      light->SetPosition(l[0], l[1], l[2]);
+      light->SetFocalPoint(0., 0., 0.);
+      light->SetColor(l[3], l[4], l[5]);
+      light->SetIntensity(.6);
+      this->renderer->AddLight(light);
+    }
+    this->renderer->ResetCamera();
+    this->renderer->GetActiveCamera()->Azimuth(30.);
+    this->renderer->GetActiveCamera()->Elevation(20.);
+    this->renderer->GetActiveCamera()->Zoom(1.6);
+    this->renderer->ResetCameraClippingRange();
+  }
+
+  double milliseconds()
+  {
+    const auto begin = std::chrono::steady_clock::now();
+    this->window->Render();
+    // Reading a pixel waits for the GPU.
+    vtkNew<vtkUnsignedCharArray> pixel;
+    this->window->GetPixelData(0, 0, 0, 0, 0, pixel);
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+      .count();
+  }
+  double median(int frames)
+  {
+    this->milliseconds(); // compiles and uploads
+    std::vector<double> times;
+    for (int f = 0; f < frames; ++f)
+    {
+      this->renderer->GetActiveCamera()->Azimuth(f % 2 ? -.2 : .2);
+      times.push_back(this->milliseconds());
+    }
+    std::sort(times.begin(), times.end());
+    return times[times.size() / 2];
+  }
+};
+
+double psnr(vtkImageData* a, vtkImageData* b)
+{
+  int size[3];
+  a->GetDimensions(size);
+  double squares = 0.;
+  for (int y = 0; y < size[1]; ++y)
+  {
+    for (int x = 0; x < size[0]; ++x)
+    {
+      for (int c = 0; c < 3; ++c)
+      {
+        const double d = pixel(a, x, y)[c] - pixel(b, x, y)[c];
+        squares += d * d;
+      }
+    }
+  }
+  return 10. * std::log10(255. * 255. * 3. * size[0] * size[1] / std::max(squares, 1.));
+}
+
+int compareFiles(const char* a, const char* b)
+{
+  vtkNew<vtkPNGReader> readers[2];
+  readers[0]->SetFileName(a);
+  readers[1]->SetFileName(b);
+  readers[0]->Update();
+  readers[1]->Update();
+  std::printf("%.1f\n", psnr(readers[0]->GetOutput(), readers[1]->GetOutput()));
+  return 0;
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  int n = 64;
+  int pixels = 512;
+  int frames = 5;
+  std::string folder;
+  if (argc == 4 && std::string(argv[1]) == "--psnr")
+  {
+    return compareFiles(argv[2], argv[3]);
+  }
+  for (int i = 1; i + 1 < argc; i += 2)
+  {
+    const std::string option = argv[i];
+    if (option == "-d")
+    {
+      folder = argv[i + 1];
+      continue;
+    }
+    (option == "-n"     ? n
+        : option == "-w" ? pixels
+                         : frames) = std::atoi(argv[i + 1]);
+  }
+  if (!canRender())
+  {
+    return Suite::skipped();
+  }
+  auto image = makeVolume(n);
+  vtkNew<vtkColorTransferFunction> color;
+  color->AddRGBPoint(0., 0., 0., 0.);
+  color->AddRGBPoint(255., 1., .9, .8);
+  vtkNew<vtkPiecewiseFunction> opacity;
+  opacity->AddPoint(0., 0.);
+  opacity->AddPoint(255., .15);
+  vtkNew<vtkVolumeProperty> property;
+  property->SetColor(color);
+  property->SetScalarOpacity(opacity);
+  property->SetScalarOpacityUnitDistance(.1);
+  property->SetInterpolationTypeToLinear();
+  property->ShadeOn();
+
+  vtkNew<vtkOpenGLGPUVolumeRayCastMapper> stock;
+  vtkNew<vtkLightTransportVolumeMapper> lit;
+  vtkNew<vtkVolumeLightingProperty> lighting;
+  lit->SetLightingProperty(lighting);
+  View stockView(stock, image, property, pixels);
+  View litView(lit, image, property, pixels);
+
+  struct Mode
+  {
+    const char* name;
+    std::function<void()> set;
+  };
+  const std::vector<Mode> modes = {
+    { "no shadows", [&] { lighting->SetShadowModeToNoShadows(); } },
+    { "precomputed", [&] { lighting->SetShadowModeToPrecomputed(); } },
+    { "precomputed, no ambient occlusion", [&] { lighting->SetAmbientOcclusion(0.); } },
+    { "precomputed, harmonics alone", [&] { lighting->SetNumberOfExactLights(0); } },
+    { "precomputed, environment",
+      [&]
+      {
+        lighting->SetNumberOfExactLights(4);
+        lighting->SetAmbientOcclusion(1.);
+        lighting->SetEnvironmentStrength(.5);
+      } },
+    { "precomputed, first hit",
+      [&]
+      {
+        lighting->SetEnvironmentStrength(0.);
+        lighting->DeferredOn();
+      } },
+    { "ray traced",
+      [&]
+      {
+        lighting->DeferredOff();
+        lighting->SetShadowModeToRayTraced();
+      } },
+  };
+  const double shaded = stockView.median(frames);
+  std::printf("%d^3 points, %d^2 pixels, three lights, medians of %d frames, %s\n\n", n, pixels,
+    frames, reinterpret_cast<const char*>(glGetString(GL_RENDERER)));
+  std::printf("| lighting | ms | of stock's |\n|---|---|---|\n| stock, shaded | %.0f | 1 |\n", shaded);
+  for (const Mode& mode : modes)
+  {
+    mode.set();
+    const double ms = litView.median(std::string(mode.name) == "ray traced" ? 1 : frames);
+    std::printf("| %s | %.0f | %.2f |\n", mode.name, ms, ms / shaded);
+    std::fflush(stdout);
+  }
+
+  // What VTK 9.2's secondary rays compute: isotropic scattering, no surfaces.
+  property->SetAmbient(0.);
+  property->SetDiffuse(1.);
+  property->SetSpecular(0.);
+  lighting->SetGradientThreshold(1e9);
+  const Picture reference = capture(litView.window);
+  lighting->SetShadowModeToPrecomputed();
+  const Picture precomputed = capture(litView.window);
+  lighting->SetNumberOfExactLights(0);
+  const Picture harmonics = capture(litView.window);
+  std::printf("\nOf the medium alone, against ray traced: precomputed %.1f dB, from harmonics %.1f dB\n",
+    psnr(precomputed, reference), psnr(harmonics, reference));
+  if (!folder.empty())
+  {
+    writePicture(reference, folder + "/reference.png");
+    writePicture(precomputed, folder + "/precomputed.png");
+    writePicture(harmonics, folder + "/harmonics.png");
+    vtkNew<vtkXMLImageDataWriter> writer;
+    writer->SetInputData(image);
+    writer->SetFileName((folder + "/volume.vti").c_str());
+    writer->Write();
+  }
+  return 0;
+}
