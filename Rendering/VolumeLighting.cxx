@@ -19,6 +19,8 @@
 #include "vtkMath.h"
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLRenderWindow.h"
+#include "vtkOpenGLRenderer.h"
+#include "vtkPBRIrradianceTexture.h"
 #include "vtkPointData.h"
 #include "vtkRenderer.h"
 #include "vtkSMPTools.h"
@@ -579,7 +581,10 @@ void VolumeLighting::ReadEnvironment(vtkRenderer* renderer)
   {
     return;
   }
-  const bool sRGB = texture->GetUseSRGBColorSpace();
+  // SetEnvironmentTexture(texture, isSRGB) keeps its flag with VTK's own irradiance.
+  auto* own = vtkOpenGLRenderer::SafeDownCast(renderer);
+  const bool sRGB = texture->GetUseSRGBColorSpace() ||
+    (own && own->GetEnvMapIrradiance()->GetConvertToLinear());
   const bool cube = texture->GetCubeMap();
   for (int face = 0; face < (cube ? 6 : 1); ++face)
   {
@@ -682,7 +687,7 @@ void VolumeLighting::ProjectEnvironment(vtkRenderer* renderer, int values)
       double data[4];
       this->WorldToData->MultiplyPoint(world, data);
       vtkMath::Normalize(data);
-      double Y[9];
+      double Y[25];
       vtkVisibilityFactorFilter::GetHarmonics(2, data, Y);
       for (int color = 0; color < 3; ++color)
       {

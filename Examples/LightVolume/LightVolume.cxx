@@ -378,6 +378,8 @@ Json DescribeParameters(const Options& o, const Look& look)
   p["view"] = o.View;
   p["tf"] = DescribeCurve(o.TransferFunction);
   p["camera"] = Json::List(o.Camera);
+  p["key_light"] = Json::List(o.KeyLight);
+  p["shadow_strength"] = o.ShadowStrength;
   p["up"] = o.Up;
   p["size"] = Json::List(o.Size);
   p["decades"] = o.Decades;
@@ -460,6 +462,23 @@ int Run(Options options)
   if (!look.Why.empty())
   {
     progress.Say("preset " + look.Preset + ": " + look.Why);
+  }
+
+  if (!options.NeedsSolve())
+  {
+    Pictures pictures(volume, statistics, look, options);
+    const std::string folder = options.Out + (options.Out.back() == '/' ? "" : "/");
+    std::string list;
+    for (const std::string& kind : options.Pictures)
+    {
+      progress.Begin("draw " + kind);
+      WriteWhole(
+        folder + kind + ".png", [&](const std::string& path) { pictures.Write(kind, path); });
+      progress.End();
+      list += " " + kind + ".png";
+    }
+    progress.Say("in " + folder + ":" + list);
+    return 0;
   }
 
   // Does the solve fit? Arrays, solver and pictures take about this much per voxel.

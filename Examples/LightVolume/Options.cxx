@@ -443,11 +443,29 @@ const std::vector<Option>& Table()
     { "--title", "TEXT", "written in the pictures (default: the file's name)",
       [](Options& o, S v) { o.Title = v; } },
     { "--pictures", "LIST",
-      "of plain,lit,slices,flux,arrows, or none (default: plain,lit,slices); flux: colour by "
-      "the direction in which light flows; arrows: the slices with it",
-      [](Options& o, S v) {
-        o.Pictures = ParseSubset("--pictures", v, { "plain", "lit", "slices", "flux", "arrows" });
+      "of plain,lit,slices,flux,arrows,shaded,shadows,environment, or none (default: "
+      "plain,lit,slices); flux: colour by the direction in which light flows; arrows: the slices "
+      "with it; shaded, shadows, environment: the volume lit from outside, by VTK's own shading, "
+      "with shadows, and in a studio: with these alone and --files none nothing is solved",
+      [](Options& o, S v)
+      {
+        o.Pictures = ParseSubset("--pictures", v,
+          { "plain", "lit", "slices", "flux", "arrows", "shaded", "shadows", "environment" });
       } },
+    { "--key-light", "AZ,EL",
+      "where the light of shaded, shadows and environment comes from: degrees to the right of the "
+      "viewer, and up (default -40,40)",
+      [](Options& o, S v)
+      {
+        o.KeyLight = ToNumbers(v, ',');
+        if (o.KeyLight.size() != 2 || std::abs(o.KeyLight[1]) > 90.)
+        {
+          Refuse("--key-light", v, "AZ,EL: two numbers, the elevation from -90 to 90");
+        }
+      } },
+    { "--shadow-strength", "F", "how dark shadows are, 0 to 1 (default 0.85)",
+      [](Options& o, S v)
+      { o.ShadowStrength = ParseNumber("--shadow-strength", v, 0, 1, "a number from 0 to 1"); } },
     { "--no-render", "", "no pictures, no OpenGL", [](Options& o, S) { o.Render = false; } },
 
     { "", "", "Output", {} },
@@ -592,6 +610,17 @@ Options ParseOptions(const std::vector<std::string>& arguments)
     options.Courant = options.Mode == "implicit" ? 1000. : 1.;
   }
   return options;
+}
+
+bool Options::NeedsSolve() const
+{
+  const auto solved = [](const std::string& picture)
+  {
+    return picture != "plain" && picture != "shaded" && picture != "shadows" &&
+      picture != "environment";
+  };
+  return !this->Render || !this->Files.empty() || this->Pictures.empty() ||
+    std::any_of(this->Pictures.begin(), this->Pictures.end(), solved);
 }
 
 std::string HelpText()

@@ -87,14 +87,18 @@ struct Options
   std::string View = "overlay";
   double Decades = 6.;
   double Strength = 1.;
-  double LightOpacity = -1.;  // < 0: the preset's
-  double TissueOpacity = -1.; // < 0: the preset's
-  std::vector<double> Camera; // azimuth, elevation, zoom
+  double LightOpacity = -1.;                    // < 0: the preset's
+  double TissueOpacity = -1.;                   // < 0: the preset's
+  std::vector<double> KeyLight = { -40., 40. }; // azimuth, elevation, from the viewer
+  double ShadowStrength = .85;
+  std::vector<double> Camera;                   // azimuth, elevation, zoom
   std::string Up = "z";
   Curve TransferFunction;
   std::string Title;
   std::vector<std::string> Pictures = { "plain", "lit", "slices" };
   bool Render = true;
+  /** Whether any picture or file shows the light of the seeds. */
+  bool NeedsSolve() const;
 
   std::string Out = "light-volume-out";
   double Threshold = 1e-3;

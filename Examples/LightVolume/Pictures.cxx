@@ -9,10 +9,13 @@
 #include "vtkLightTransportArrays.h"
 #include "vtkLightTransportEGLRenderWindow.h"
 #include "vtkLightTransportVolumeMapper.h"
+#include "vtkVolumeLightingProperty.h"
 
 #include "vtkAnnotatedCubeActor.h"
 #include "vtkCamera.h"
 #include "vtkDataArray.h"
+#include "vtkFloatArray.h"
+#include "vtkLight.h"
 #include "vtkLookupTable.h"
 #include "vtkMath.h"
 #include "vtkPNGWriter.h"
@@ -24,6 +27,7 @@
 #include "vtkScalarBarActor.h"
 #include "vtkTextActor.h"
 #include "vtkTextProperty.h"
+#include "vtkTexture.h"
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
 #include "vtkWindowToImageFilter.h"
@@ -78,6 +82,37 @@ void StyleText(vtkTextActor* actor, int size, double grey, bool bold)
   text->SetBold(bold);
   text->SetLineSpacing(1.25);
 }
+/** A studio: brightest above, a soft box where the key light comes from, dim below. */
+vtkSmartPointer<vtkTexture> MakeSky(const double up[3], const double key[3])
+{
+  constexpr int width = 64;
+  constexpr int height = 32;
+  vtkNew<vtkFloatArray> radiance;
+  radiance->SetNumberOfComponents(3);
+  radiance->SetNumberOfTuples(width * height);
+  for (int y = 0; y < height; ++y)
+  {
+    const double theta = vtkMath::Pi() * (y + .5) / height;
+    for (int x = 0; x < width; ++x)
+    {
+      // VTK's equirectangular maps: the first row is straight down, the middle column +x.
+      const double phi = vtkMath::Pi() * (2. * (x + .5) / width - 1.);
+      const double d[3] = { std::sin(theta) * std::cos(phi), -std::cos(theta),
+        std::sin(theta) * std::sin(phi) };
+      const double high = .5 + .5 * vtkMath::Dot(d, up);
+      const double box = std::pow(std::max(vtkMath::Dot(d, key), 0.), 6.);
+      radiance->SetTuple3(y * width + x, .25 + .55 * high + 1.5 * box, .26 + .6 * high + 1.42 * box,
+        .3 + .68 * high + 1.25 * box);
+    }
+  }
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(width, height, 1);
+  image->GetPointData()->SetScalars(radiance);
+  auto sky = vtkSmartPointer<vtkTexture>::New();
+  sky->SetInputData(image);
+  sky->SetColorModeToDirectScalars();
+  return sky;
+}
 } // namespace
 
 struct Pictures::Parts
@@ -95,6 +130,7 @@ struct Pictures::Parts
   vtkNew<vtkLightTransportVolumeMapper> Mapper;
   vtkNew<vtkVolume> Prop;
   vtkNew<vtkLightFieldProperty> Property;
+  vtkNew<vtkVolumeLightingProperty> Lighting;
   vtkNew<vtkTextActor> Title;
   vtkNew<vtkTextActor> Caption;
   vtkNew<vtkScalarBarActor> Bar;
@@ -106,6 +142,7 @@ struct Pictures::Parts
   VtkErrors Errors;
 
   void PlaceCamera(const Options& options);
+  void PlaceLights(const std::string& kind);
   bool StyleBar(vtkScalarBarActor* bar, vtkLookupTable* colors, double sign, double extreme);
   void ShowLegend(bool on);
 };
@@ -325,6 +362,57 @@ void Pictures::Parts::PlaceCamera(const Options& options)
   this->Scene->ResetCameraClippingRange();
 }
 
+// A key light that stands in the scene, and a weak one at the camera; for the other kinds VTK's own
+// headlight.
+void Pictures::Parts::PlaceLights(const std::string& kind)
+{
+  const bool environment = kind == "environment";
+  const bool shaded = environment || kind == "shaded" || kind == "shadows";
+  this->Scene->RemoveAllLights();
+  this->Scene->SetEnvironmentTexture(nullptr);
+  this->Mapper->SetLightingProperty(shaded && kind != "shaded" ? this->Lighting.Get() : nullptr);
+  this->Lighting->SetEnvironmentStrength(environment ? .7 : 0.);
+  this->Lighting->SetShadowStrength(this->TheOptions->ShadowStrength);
+  this->Prop->GetProperty()->SetAmbient(environment ? 0. : .25);
+  if (!shaded)
+  {
+    return;
+  }
+  const auto& angles = this->TheOptions->KeyLight;
+  const double azimuth = vtkMath::RadiansFromDegrees(angles[0]);
+  const double elevation = vtkMath::RadiansFromDegrees(angles[1]);
+  vtkCamera* camera = this->Scene->GetActiveCamera();
+  double to[3];
+  double up[3];
+  double right[3];
+  double key[3];
+  camera->GetDirectionOfProjection(to);
+  camera->OrthogonalizeViewUp();
+  camera->GetViewUp(up);
+  vtkMath::Cross(to, up, right);
+  for (int a = 0; a < 3; ++a)
+  {
+    key[a] = std::cos(elevation) * (-std::cos(azimuth) * to[a] + std::sin(azimuth) * right[a]) +
+      std::sin(elevation) * up[a];
+  }
+  vtkNew<vtkLight> sun;
+  sun->SetLightTypeToSceneLight();
+  sun->SetFocalPoint(0., 0., 0.);
+  sun->SetPosition(key);
+  sun->SetIntensity(environment ? .8 : 1.15);
+  sun->SetColor(1., .97, .92);
+  this->Scene->AddLight(sun);
+  vtkNew<vtkLight> fill;
+  fill->SetLightTypeToHeadlight();
+  fill->SetIntensity(environment ? .15 : .4);
+  fill->SetColor(.88, .94, 1.);
+  this->Scene->AddLight(fill);
+  if (environment)
+  {
+    this->Scene->SetEnvironmentTexture(MakeSky(up, key));
+  }
+}
+
 void Pictures::SetLight(vtkImageData* light, const std::array<double, 3>& slicePosition)
 {
   Parts& p = *this->P;
@@ -430,7 +518,7 @@ void Pictures::Write(const std::string& kind, const std::string& path)
 {
   Parts& p = *this->P;
   const bool slices = kind == "slices" || kind == "arrows";
-  const bool lit = kind != "plain";
+  const bool lit = kind == "lit" || kind == "flux" || slices;
   p.Errors.Clear();
   p.Property->SetMode(kind == "flux"                  ? vtkLightFieldProperty::FluxDirection
       : p.TheOptions->View == "illuminate" && !slices ? vtkLightFieldProperty::Illuminate
@@ -454,6 +542,7 @@ void Pictures::Write(const std::string& kind, const std::string& path)
   else
   {
     p.Mapper->SetLightFieldData(lit ? p.Light.Get() : nullptr);
+    p.PlaceLights(kind);
     p.ShowLegend(lit);
     const char* axes = p.TheVolume->IsRAS
       ? "colour: where light flows to or from; red right-left, green front-back, blue up-down"

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
 /**
- * The pictures of a run: the volume alone, with its light, and three slices. All come from one
- * window, so the volume is uploaded once.
+ * The pictures of a run: the volume alone, shaded, with shadows, with its light, and three slices.
+ * All come from one window, so the volume is uploaded once.
  */
 #ifndef LightVolume_Pictures_h
 #define LightVolume_Pictures_h
@@ -33,7 +33,11 @@ public:
   /** Small lines below the picture. */
   void SetCaption(const std::vector<std::string>& lines);
 
-  /** kind: plain, lit, slices, flux or arrows. Throws an Error when OpenGL complains. */
+  /**
+   * kind: plain, lit, slices, flux or arrows; shaded, shadows or environment, which need no light:
+   * VTK's own shading by a key light and a weak headlight, the same with shadows, and in a studio.
+   * Throws an Error when OpenGL complains.
+   */
   void Write(const std::string& kind, const std::string& path);
 
 private:
