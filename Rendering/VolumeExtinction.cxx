@@ -400,6 +400,9 @@ struct Worker
       : 1.;
   }
 
+  /** The first value of a block; blocks of the margin are empty. */
+  int begin(int block) const { return std::max(block - 1, 0) * this->step; }
+
   void operator()(vtkIdType begin, vtkIdType end) const
   {
     const int* n = this->scalars.dimensions;
@@ -411,11 +414,12 @@ struct Worker
       for (int ci = 0; ci < this->coarse[0]; ++ci)
       {
         double sum = 0.;
-        for (int k = ck * this->step; k < std::min((ck + 1) * this->step, n[2]); ++k)
+        // The first block of each axis is the margin's, before the volume.
+        for (int k = this->begin(ck); k < std::min(ck * this->step, n[2]); ++k)
         {
-          for (int j = cj * this->step; j < std::min((cj + 1) * this->step, n[1]); ++j)
+          for (int j = this->begin(cj); j < std::min(cj * this->step, n[1]); ++j)
           {
-            for (int i = ci * this->step; i < std::min((ci + 1) * this->step, n[0]); ++i)
+            for (int i = this->begin(ci); i < std::min(ci * this->step, n[0]); ++i)
             {
               const double index[3] = { i + this->scalars.first[0], j + this->scalars.first[1],
                 k + this->scalars.first[2] };
@@ -543,12 +547,12 @@ std::string VolumeExtinction(
   vtkMatrix4x4* indexToData = scalars.image->GetIndexToPhysicalMatrix();
   for (int a = 0; a < 3; ++a)
   {
-    coarse[a] = (n[a] + step - 1) / step;
+    coarse[a] = (n[a] + step - 1) / step + 2;
     spacing[a] = scalars.image->GetSpacing()[a] * step;
     origin[a] = indexToData->GetElement(a, 3);
     for (int b = 0; b < 3; ++b)
     {
-      origin[a] += indexToData->GetElement(a, b) * (scalars.first[b] + .5 * (step - 1));
+      origin[a] += indexToData->GetElement(a, b) * (scalars.first[b] + .5 * (step - 1) - step);
       axes[b][a] = indexToData->GetElement(a, b);
     }
   }

@@ -22,7 +22,8 @@ std::vector<double> VolumeExtinctionKey(
  * would composite it: scalar and gradient opacity or 2-D transfer functions, components, masks,
  * cropping and clipping, sigma_t = -ln(1 - opacity) / unit distance, the opacity at most 0.9999.
  * On the volume's points, or the means of blocks of them so that at most `resolution` remain along
- * the longest axis. NaN is transparent. Returns what is wrong with the input, or nothing.
+ * the longest axis, and a margin of one transparent block around: what lies at the border can be
+ * seen from outside. NaN is transparent. Returns what is wrong with the input, or nothing.
  */
 std::string VolumeExtinction(
   vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, vtkImageData* result);

@@ -583,8 +583,8 @@ void VolumeLighting::ReadEnvironment(vtkRenderer* renderer)
   }
   // SetEnvironmentTexture(texture, isSRGB) keeps its flag with VTK's own irradiance.
   auto* own = vtkOpenGLRenderer::SafeDownCast(renderer);
-  const bool sRGB = texture->GetUseSRGBColorSpace() ||
-    (own && own->GetEnvMapIrradiance()->GetConvertToLinear());
+  const bool sRGB =
+    texture->GetUseSRGBColorSpace() || (own && own->GetEnvMapIrradiance()->GetConvertToLinear());
   const bool cube = texture->GetCubeMap();
   for (int face = 0; face < (cube ? 6 : 1); ++face)
   {
@@ -895,8 +895,10 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     const int longest = *std::max_element(n, n + 3);
     const int resolution = property->GetVisibilityResolution();
     const int step = std::max(1, (longest + resolution - 1) / resolution);
-    this->SurfaceOffset = property->GetSurfaceOffset() * step * scale *
+    const double length = property->GetSurfaceOffset() * step *
       std::cbrt(std::abs(spacing[0] * spacing[1] * spacing[2]));
+    this->SurfaceOffset[0] = static_cast<float>(length * scale);
+    this->SurfaceOffset[1] = static_cast<float>(length);
   }
   const double given = property->GetGradientThreshold();
   for (int c = 0; c < 4; ++c)
@@ -993,7 +995,10 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
 
   set("in_ltLightingStrength", property->GetStrength());
   set("in_ltShadowStrength", property->GetShadowStrength());
-  set("in_ltSurfaceOffset", this->SurfaceOffset);
+  if (program->IsUniformUsed("in_ltSurfaceOffset"))
+  {
+    program->SetUniform2f("in_ltSurfaceOffset", this->SurfaceOffset);
+  }
   set("in_ltAnisotropy", property->GetAnisotropy());
   set("in_ltOcclusionStrength", property->GetAmbientOcclusion());
   if (program->IsUniformUsed("in_ltMaterial"))

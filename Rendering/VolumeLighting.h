@@ -134,7 +134,7 @@ private:
   std::string DefinesOfFrame;
   vtkNew<vtkMatrix4x4> DatasetToVC;
   vtkNew<vtkMatrix4x4> WorldToData;
-  double SurfaceOffset = 0.; // world length
+  float SurfaceOffset[2] = { 0.F, 0.F }; // world, data
   float Thresholds[4] = { 1.F, 1.F, 1.F, 1.F };
   std::vector<Radiance> Environment;
   vtkTexture* EnvironmentSource = nullptr; // compared, never used

@@ -154,7 +154,9 @@ public:
    * How far before a surface, along its normal, visibility is looked up: in voxels of
    * the visibility's grid, in [0,10] (clamped), default 2. With 0 the first layer of
    * voxels already shadows the surface that it is, as single scattering in a cloud
-   * has it: opaque surfaces then have half their brightness.
+   * has it: opaque surfaces then have half their brightness. So does, towards the eye,
+   * what is opaque within this length (from an optical depth of 1 on, fully from 4
+   * on), such as a cut through dense matter.
    */
   void SetSurfaceOffset(double voxels);
   vtkGetMacro(SurfaceOffset, double);

@@ -124,8 +124,8 @@ float ltTransmittance(vec3 positionTC, vec3 l, float reach)
 }
 #endif
 
-// The light that a place of this colour sends to the eye.
-vec3 ltLit(vec3 color, int component, vec3 positionTC)
+// The light that a place of this colour sends to the eye; the opacity is that over a sample distance.
+vec3 ltLit(vec3 color, float opacity, int component, vec3 positionTC)
 {
   vec3 gradient = ltGradient(positionTC, component);
   float magnitude = length(gradient);
@@ -133,9 +133,12 @@ vec3 ltLit(vec3 color, int component, vec3 positionTC)
   float surface = smoothstep(0.5, 2.0, magnitude / in_ltGradientThreshold[component]);
   n = dot(n, g_ltViewWC) < 0.0 ? -n : n;
 
-  // A surface is not shadowed by itself: what reaches it is looked up a little before it.
+  // A surface is not shadowed by itself: what reaches it is looked up a little before it. Nor is
+  // what is opaque within that length, such as a cut through dense matter.
 #if LT_LOOKS_UP || LT_SHADOW == 2
-  vec3 beforeTC = positionTC + g_ltWCToTC * (surface * in_ltSurfaceOffset * n);
+  float depth = -log(max(1.0 - opacity, 1e-6)) * in_ltSurfaceOffset.y / in_sampleDistance;
+  vec3 before = mix(smoothstep(1.0, 4.0, depth) * g_ltViewWC, n, surface);
+  vec3 beforeTC = positionTC + g_ltWCToTC * (in_ltSurfaceOffset.x * before);
 #endif
 #if LT_LOOKS_UP
   vec3 positionVC = (g_ltTCToVC * vec4(beforeTC, 1.0)).xyz;
@@ -209,7 +212,7 @@ vec4 computeLighting(vec4 color, int component, float label)
   color.a = stock.a;
 #endif
 #if !LT_DEFERRED
-  vec3 lit = ltLit(color.rgb, component, g_dataPos);
+  vec3 lit = ltLit(color.rgb, color.a, component, g_dataPos);
 #if LT_MIXED
   lit = mix(stock.rgb, lit, in_ltLightingStrength);
 #endif

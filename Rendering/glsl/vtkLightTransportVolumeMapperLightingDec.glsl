@@ -92,7 +92,7 @@ vec3 g_ltViewWC;               // to the eye; the same all along a ray
 #if LT_POSITIONAL
 mat4 g_ltTCToWC;
 #endif
-uniform float in_ltSurfaceOffset; // world length
+uniform vec2 in_ltSurfaceOffset; // length in the world, and in the data's coordinates
 mat3 g_ltWCToTC;                  // of directions
 
 // Affine maps, once per ray. TCToData is TC -> data coordinates.

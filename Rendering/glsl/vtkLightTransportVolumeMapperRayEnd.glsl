@@ -10,7 +10,7 @@ g_fragColor = ltComposeProjection(g_fragColor);
 // The ray's colour, as far as it has one, lit where it was hit.
 if (g_fragColor.a > 0.0)
 {
-  vec3 lt_lit = ltLit(g_fragColor.rgb / g_fragColor.a, 0, lt_hitTC) * g_fragColor.a;
+  vec3 lt_lit = ltLit(g_fragColor.rgb / g_fragColor.a, 1.0, 0, lt_hitTC) * g_fragColor.a;
   g_fragColor.rgb = mix(g_fragColor.rgb, lt_lit, in_ltLightingStrength);
 }
 #endif

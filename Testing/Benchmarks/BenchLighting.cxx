@@ -65,8 +65,8 @@ struct View
   vtkNew<vtkRenderer> renderer;
   vtkNew<vtkVolume> volume;
 
-  View(vtkGPUVolumeRayCastMapper* mapper, vtkImageData* image, vtkVolumeProperty* property,
-    int pixels)
+  View(
+    vtkGPUVolumeRayCastMapper* mapper, vtkImageData* image, vtkVolumeProperty* property, int pixels)
   {
     mapper->SetInputData(image);
     mapper->AutoAdjustSampleDistancesOff();
@@ -169,9 +169,7 @@ int main(int argc, char* argv[])
       folder = argv[i + 1];
       continue;
     }
-    (option == "-n"     ? n
-        : option == "-w" ? pixels
-                         : frames) = std::atoi(argv[i + 1]);
+    (option == "-n" ? n : option == "-w" ? pixels : frames) = std::atoi(argv[i + 1]);
   }
   if (!canRender())
   {
@@ -231,7 +229,8 @@ int main(int argc, char* argv[])
   const double shaded = stockView.median(frames);
   std::printf("%d^3 points, %d^2 pixels, three lights, medians of %d frames, %s\n\n", n, pixels,
     frames, reinterpret_cast<const char*>(glGetString(GL_RENDERER)));
-  std::printf("| lighting | ms | of stock's |\n|---|---|---|\n| stock, shaded | %.0f | 1 |\n", shaded);
+  std::printf(
+    "| lighting | ms | of stock's |\n|---|---|---|\n| stock, shaded | %.0f | 1 |\n", shaded);
   for (const Mode& mode : modes)
   {
     mode.set();
@@ -250,7 +249,8 @@ int main(int argc, char* argv[])
   const Picture precomputed = capture(litView.window);
   lighting->SetNumberOfExactLights(0);
   const Picture harmonics = capture(litView.window);
-  std::printf("\nOf the medium alone, against ray traced: precomputed %.1f dB, from harmonics %.1f dB\n",
+  std::printf(
+    "\nOf the medium alone, against ray traced: precomputed %.1f dB, from harmonics %.1f dB\n",
     psnr(precomputed, reference), psnr(harmonics, reference));
   if (!folder.empty())
   {

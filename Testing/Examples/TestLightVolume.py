@@ -212,6 +212,26 @@ class LightVolume(unittest.TestCase):
         self.assertEqual(code, 0, stdout + stderr)
         self.assertIn("no --seed", stdout)
 
+    def test_lit_from_outside_needs_no_solve(self):
+        if not ARGUMENTS.picture:
+            self.skipTest("no OpenGL")
+        out = self.path("outside")
+        kinds = ["shaded", "shadows", "environment"]
+        for side, light in (("left", "-80,0"), ("right", "80,0")):
+            code, stdout, stderr = self.run_program(
+                self.ball, "--out", out, "--pictures", ",".join(kinds), "--files", "none",
+                "--size", "64x64", "--tf", "50:0,90:1", "--key-light", light,
+                "--shadow-strength", "1")
+            self.assertEqual((code, stderr), (0, ""), stdout + stderr)
+            self.assertNotIn("solve", stdout)
+            self.assertEqual(sorted(os.listdir(out)), sorted(kind + ".png" for kind in kinds))
+            os.rename(os.path.join(out, "shadows.png"), self.path(f"shadows-{side}.png"))
+        pictures = []
+        for side in ("left", "right"):
+            with open(self.path(f"shadows-{side}.png"), "rb") as file:
+                pictures.append(file.read())
+        self.assertNotEqual(*pictures)
+
     def test_what_opengl_cannot_draw_leaves_the_rest(self):
         if not ARGUMENTS.picture:
             self.skipTest("no OpenGL")
@@ -239,6 +259,8 @@ class LightVolume(unittest.TestCase):
         self.refuse(ball, "--mapping", "magic", words=("magic", "gradient, transfer or"))
         self.refuse(ball, "--size", "640", words=("--size", "WIDTHxHEIGHT"))
         self.refuse(ball, "--tf", "10:2", words=("--tf", "10:2"))
+        self.refuse(ball, "--key-light", "10,95", words=("--key-light", "10,95", "elevation"))
+        self.refuse(ball, "--shadow-strength", "2", words=("--shadow-strength", "0 to 1"))
         self.refuse(ball, "--steps", "1.5", words=("--steps", "1.5"))
         self.refuse(ball, "--model", "anisotropic", "--mode", "steady", words=("steady", "constant"))
         self.refuse(ball, ball, words=("two inputs",))
