@@ -594,8 +594,8 @@ bool KBuffer::Blend(int first, int last)
   const int* size = this->Now.size;
   const int* origin = this->Now.origin;
   this->Counter.Bind();
-  const std::string key = this->Defines(this->Room()) +
-    define("LT_READ_TARGET", this->Now.into.plain) + define("LT_CLAMP", this->Now.into.clamps);
+  const std::string key =
+    this->Defines(this->Room()) + define("LT_READ_TARGET", this->Now.into.plain);
   if (!this->Quad || this->QuadKey != key)
   {
     const std::string body = this->Now.style

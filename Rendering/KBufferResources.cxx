@@ -182,9 +182,9 @@ PictureTarget PictureTarget::Bound()
   GLint readObject = 0;
   glGetIntegerv(GL_SAMPLE_BUFFERS, &samples);
   glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &readObject);
-  target.clamps = ask(GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE) != GL_FLOAT;
-  target.plain = target.clamps && samples == 0 && readObject == object &&
-    ask(GL_FRAMEBUFFER_ATTACHMENT_RED_SIZE) == 8 &&
+
+  target.plain = ask(GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE) != GL_FLOAT && samples == 0 &&
+    readObject == object && ask(GL_FRAMEBUFFER_ATTACHMENT_RED_SIZE) == 8 &&
     ask(GL_FRAMEBUFFER_ATTACHMENT_ALPHA_SIZE) == 8 && glIsEnabled(GL_FRAMEBUFFER_SRGB) == GL_FALSE;
   return target;
 }

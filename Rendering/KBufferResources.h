@@ -95,7 +95,7 @@ private:
 /** What the picture is drawn into. */
 struct PictureTarget
 {
-  bool clamps = true; // holds colours in [0,1]
+
   bool plain = false; // 8 bits, one sample, linear: blended in the shader, rounded once
 
   static PictureTarget Bound();

@@ -549,7 +549,7 @@ bool vtkBucketedKBufferPass::SetShaderParameters(vtkShaderProgram* program,
   program->SetUniformi("ltOpaqueDepth", buffer.OpaqueDepth->GetTextureUnit());
   program->SetUniformi("ltWidth", buffer.Now.size[0]);
   program->SetUniformi("ltCapacity", static_cast<int>(buffer.Capacity));
-  program->SetUniformi("ltClampColor", buffer.Now.into.clamps);
+
   auto* actor = vtkActor::SafeDownCast(prop);
   program->SetUniformi(
     "ltThin", actor && actor->GetProperty()->GetRepresentation() != VTK_SURFACE ? 1 : 0);

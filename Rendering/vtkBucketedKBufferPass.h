@@ -61,8 +61,8 @@
  * there were.
  *
  * The picture is blended over the target as premultiplied colour, so that a
- * transparent background stays so. Colours are clamped to [0,1] where the target
- * is.
+ * transparent background stays so. Colours may exceed 1, as highlights do, until the
+ * picture clamps their sum.
  *
  * Needs OpenGL 4.3, no fragment interlock. Where that is missing, or the viewport
  * has more pixels than a buffer can hold, it says so once and lets
@@ -70,6 +70,13 @@
  *
  * Lines and points are in the same lists, without a second look at a point or an
  * edge that several triangles of a wireframe draw.
+ *
+ * Physically based and image-based shading are the mapper's and work as they are; tone
+ * mapping takes the sequence above; ambient occlusion of the opaque surfaces is
+ * @code
+ *   ssao->SetDelegatePass(opaquePass);
+ *   steps->SetOpaquePass(ssao);
+ * @endcode
  *
  * Not for: volumes, which are drawn after the surfaces as VTK does by default;
  * antialiasing (like VTK's own translucent passes it samples once per pixel).

@@ -8,7 +8,7 @@
 uniform sampler2D ltOpaqueDepth; // DC, of this viewport
 uniform int ltWidth;             // of the viewport, in pixels
 uniform int ltCapacity;          // of the buffers, in nodes
-uniform int ltClampColor;        // 1: the picture holds colours in [0,1]
+
 uniform int ltStyle;
 uniform int ltShape;             // the prop's first
 uniform int ltThin;              // 1: points or wireframe
@@ -39,7 +39,7 @@ void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
     return; // the stage is run again with room for all
   }
   color.a = clamp(color.a, 0.0, 1.0);
-  color.rgb = ltClampColor != 0 ? clamp(color.rgb, 0.0, 1.0) : clamp(color.rgb, 0.0, 65504.0);
+  color.rgb = clamp(color.rgb, 0.0, 65504.0); // what half floats hold
   ltSetColor(node, color);
 #if LT_STYLE
   shape = (uint(ltShape) + shape) & 0xFFFFFFu;

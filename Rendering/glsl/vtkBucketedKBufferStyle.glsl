@@ -3,7 +3,7 @@
 //
 // vtkBucketedKBufferPass, blending stage with stylisation: the fragment shader of a
 // quad over the viewport. Defined before: vtkBucketedKBufferCurvature.glsl, LT_ROOM, LT_LINES (1:
-// vtkBucketedKBufferLines.glsl too), LT_CLAMP (1: colours end at 1).
+// vtkBucketedKBufferLines.glsl too).
 
 in vec2 texCoord;
 #if LT_READ_TARGET
@@ -96,9 +96,7 @@ void main()
     vec3 w = ltShapeOperator(s, p, place, firsts, t1, t2);
     vec4 styled = ltStylise(c, surface.x >> 24u, s, w.x + w.z, p, place);
     c = surface.y == LT_NO_NORMAL ? c : styled;
-#if LT_CLAMP
-    c.rgb = min(c.rgb, vec3(1.0));
-#endif
+
     color += transparency * c.a * c.rgb;
     transparency *= 1.0 - c.a;
   }
