@@ -4,6 +4,7 @@
  * vtkBucketedKBufferPass in numbers:
  *
  *   bench-transparency [-w 512] [-f 5] [-d FOLDER] [-o FILE.csv] [-s speed|memory|buckets]
+ *                      [-n OBJECTS]
  *
  * Three tables of Markdown, and all numbers in FILE.csv:
  *
@@ -13,7 +14,8 @@
  *          medians of f frames; largest and mean difference from peeling
  * memory   bits per fragment by what is on, and of all buffers per pixel of the frame
  * buckets  figure 2.12 of Murray's thesis: 32 layers over the whole window, of 1 to
- *          32 objects in random order; curvature with the buckets and with one only
+ *          32 objects (or OBJECTS alone) in random order; curvature with the buckets
+ *          and with one only
  *
  * The exit code is 0 whatever the times are: another machine, other times.
  */
@@ -51,6 +53,7 @@ struct Options
 {
   int pixels = 512;
   int frames = 5;
+  int objects = 0;
   std::string data = "../shared/data";
   std::string output;
   std::string section;
@@ -286,17 +289,20 @@ void measureBuckets(const Options& options)
   row("brute force", brute);
   for (const int objects : { 1, 2, 3, 4, 5, 8, 12, 16, 24, 32 })
   {
-    row(std::to_string(objects), layersTime(options, objects, true, false));
+    if (options.objects == 0 || options.objects == objects)
+    {
+      row(std::to_string(objects), layersTime(options, objects, true, false));
+    }
   }
   std::printf("\n");
 }
 
 //------------------------------------------------------------------------------
-void measureMemory(const Options& options)
+void measureMemory()
 {
   std::printf("| kept | half: bits per fragment | float | all buffers, 32 layers everywhere, half: "
               "bytes per pixel |\n|---|---|---|---|\n");
-  for (const bool style : { false, true })
+  for (const int kept : { 0, 1, 2 })
   {
     int bits[2] = { 0, 0 };
     double perPixel = 0.;
@@ -306,21 +312,21 @@ void measureMemory(const Options& options)
       vtkNew<vtkBucketedKBufferPass> pass;
       pass->SetNumberOfLayers(32);
       pass->SetColorPrecision(precision);
-      pass->GetCurvatureOpacityProperty()->SetCurvatureShading(style);
+      pass->GetCurvatureOpacityProperty()->SetCurvatureShading(kept == 1);
+      pass->GetCurvatureOpacityProperty()->SetRidgesAndValleys(kept == 2);
       view.renderer->SetPass(pass);
       addLayers(view.renderer, 4);
       view.frame(false);
       bits[precision] = pass->GetBitsPerFragment();
       perPixel = precision == 0 ? double(pass->GetMemoryInBytes()) / (64. * 64.) : perPixel;
     }
-    const char* name = style ? "curvature" : "transparency";
+    const char* name = kept == 0 ? "transparency" : kept == 1 ? "curvature" : "lines";
     std::printf("| %s | %d | %d | %.0f |\n", name, bits[0], bits[1], perPixel);
     note("memory", std::string(name) + " half", "bits", bits[0]);
     note("memory", std::string(name) + " float", "bits", bits[1]);
   }
   std::printf("\nThe thesis has 128 bits per fragment, of 16-bit depths and 8-bit colours, for "
               "every layer of every pixel; here a fragment that is not there takes none.\n\n");
-  (void)options;
 }
 } // namespace
 
@@ -338,6 +344,10 @@ int main(int argc, char* argv[])
     else if (name == "-f")
     {
       options.frames = std::max(1, std::atoi(value.c_str()));
+    }
+    else if (name == "-n")
+    {
+      options.objects = std::atoi(value.c_str());
     }
     else if (name == "-d" || name == "-o" || name == "-s")
     {
@@ -366,7 +376,7 @@ int main(int argc, char* argv[])
   }
   if (wanted("memory"))
   {
-    measureMemory(options);
+    measureMemory();
   }
   if (wanted("buckets"))
   {
