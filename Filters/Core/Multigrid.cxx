@@ -14,7 +14,7 @@ namespace
 using Weights = MultigridWeights;
 
 /** A tile of rows has so many values per plane, and so many planes: see skew(). */
-constexpr std::int64_t TileValues = 65536;
+constexpr std::int64_t TileValues = 12288;
 constexpr int TilePlanes = 16;
 
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
