@@ -180,8 +180,8 @@ double update(std::int64_t n, double step, float alpha, const float* LIGHTTRANSP
 
 /** to = scale q - mean, and a[i] - b[i] times previous more, where given */
 template <class T>
-inline void rightHandSide(int n, const T* LIGHTTRANSPORT_RESTRICT q, double scale, double mean,
-  const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b,
+LIGHTTRANSPORT_INLINE void rightHandSide(int n, const T* LIGHTTRANSPORT_RESTRICT q, double scale,
+  double mean, const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b,
   const double* LIGHTTRANSPORT_RESTRICT previous, double* LIGHTTRANSPORT_RESTRICT to)
 {
   for (int i = 0; i < n; ++i)
@@ -220,30 +220,72 @@ double subtract(int n, const double* LIGHTTRANSPORT_RESTRICT b,
   return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
 }
 
-/** out = in + tau (b - out), the explicit step; returns the sum of squares of b - out. */
-LIGHTTRANSPORT_SIMD
-double stepRow(int n, const double* LIGHTTRANSPORT_RESTRICT b,
-  const double* LIGHTTRANSPORT_RESTRICT tau, double step, const double* LIGHTTRANSPORT_RESTRICT in,
+/** What comes into a voxel from its source and across the row, less what its sink takes. */
+template <class T>
+LIGHTTRANSPORT_INLINE double acrossRow(
+  const DoubleRow& row, const T* LIGHTTRANSPORT_RESTRICT q, double scale, double mean, int i)
+{
+  const double c = row.x[i];
+  return (q ? scale * static_cast<double>(q[i]) - mean : 0.) + double(row.gy[i]) * (row.xN[i] - c) +
+    double(row.gyS[i]) * (row.xS[i] - c) + double(row.gz[i]) * (row.xT[i] - c) +
+    double(row.gzB[i]) * (row.xB[i] - c) - double(row.s[i]) * c;
+}
+
+/**
+ * The explicit step of one row: out = x + tau (b - A x), and the sum of squares of b - A x;
+ * b = scale q - mean, tau the same everywhere or a row of them. q may be null: 0.
+ */
+template <class T>
+LIGHTTRANSPORT_INLINE double explicitStep(const DoubleRow& row, const T* LIGHTTRANSPORT_RESTRICT q,
+  double scale, double mean, double step, const double* LIGHTTRANSPORT_RESTRICT tau,
   double* LIGHTTRANSPORT_RESTRICT out)
 {
+  const int n = row.n;
+  const float* LIGHTTRANSPORT_RESTRICT gx = row.gx;
+  const double* x = row.x;
+  // along it: its ends have one face only
+  out[0] = acrossRow(row, q, scale, mean, 0) + (n > 1 ? double(gx[0]) * (x[1] - x[0]) : 0.);
+  for (int i = 1; i < n - 1; ++i)
+  {
+    out[i] = acrossRow(row, q, scale, mean, i) + double(gx[i]) * (x[i + 1] - x[i]) +
+      double(gx[i - 1]) * (x[i - 1] - x[i]);
+  }
+  if (n > 1)
+  {
+    out[n - 1] = acrossRow(row, q, scale, mean, n - 1) + double(gx[n - 2]) * (x[n - 2] - x[n - 1]);
+  }
   double sums[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
   int i = 0;
   for (; i + 8 <= n; i += 8)
   {
     for (int l = 0; l < 8; ++l)
     {
-      const double v = b[i + l] - out[i + l];
-      sums[l] += v * v;
-      out[i + l] = in[i + l] + (tau ? tau[i + l] : step) * v;
+      sums[l] += out[i + l] * out[i + l];
     }
   }
   for (; i < n; ++i)
   {
-    const double v = b[i] - out[i];
-    sums[0] += v * v;
-    out[i] = in[i] + (tau ? tau[i] : step) * v;
+    sums[0] += out[i] * out[i];
+  }
+  for (i = 0; i < n; ++i)
+  {
+    out[i] = x[i] + (tau ? tau[i] : step) * out[i];
   }
   return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+LIGHTTRANSPORT_SIMD
+double explicitRow(const DoubleRow& row, const float* q, double scale, double mean, double step,
+  const double* tau, double* out)
+{
+  return tau ? explicitStep(row, q, scale, mean, step, tau, out)
+             : explicitStep(row, q, scale, mean, step, nullptr, out);
+}
+LIGHTTRANSPORT_SIMD
+double explicitRow(const DoubleRow& row, const double* q, double scale, double mean, double step,
+  const double* tau, double* out)
+{
+  return tau ? explicitStep(row, q, scale, mean, step, tau, out)
+             : explicitStep(row, q, scale, mean, step, nullptr, out);
 }
 
 LIGHTTRANSPORT_SIMD
@@ -272,7 +314,7 @@ void addFaces(int n, double factor, const double* LIGHTTRANSPORT_RESTRICT a,
 
 /** g = factor H(a, b), H the harmonic mean in double */
 template <class T>
-inline void facesOf(int n, double factor, const T* LIGHTTRANSPORT_RESTRICT a,
+LIGHTTRANSPORT_INLINE void facesOf(int n, double factor, const T* LIGHTTRANSPORT_RESTRICT a,
   const T* LIGHTTRANSPORT_RESTRICT b, float* LIGHTTRANSPORT_RESTRICT g)
 {
   constexpr double least = std::numeric_limits<double>::min();
@@ -300,7 +342,7 @@ void faceRow(int n, double factor, const double* a, const double* b, float* g)
  * in the order of the values: comparing a NaN would raise an exception.
  */
 template <class T, class Bits>
-inline double largestOf(std::int64_t n, const T* LIGHTTRANSPORT_RESTRICT a)
+LIGHTTRANSPORT_INLINE double largestOf(std::int64_t n, const T* LIGHTTRANSPORT_RESTRICT a)
 {
   const T greatest = std::numeric_limits<T>::max();
   Bits top;
@@ -1925,17 +1967,14 @@ DiffusionReport DiffusionSolver::march(
       {
         double* out = to + r * nx;
         const DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
-        applyDouble(row, out);
         static thread_local std::vector<double> store;
-        store.resize(2 * static_cast<std::size_t>(nx));
-        double* right = store.data();
-        double* tau = local ? right + nx : nullptr;
-        b.row(r * nx, nx, right);
+        store.resize(static_cast<std::size_t>(nx));
         if (local)
         {
-          localSteps(row, step, tau);
+          localSteps(row, step, store.data());
         }
-        return stepRow(nx, right, tau, step, from + r * nx, out);
+        return explicitRow(row, q ? q + r * nx : nullptr, b.qScale, b.mean, step,
+          local ? store.data() : nullptr, out);
       }));
     std::swap(from, to);
     ++report.iterations;

@@ -29,10 +29,13 @@
 #define LIGHTTRANSPORT_SIMD
 #endif
 
+// INLINE: for what a clone calls. Left alone it would be the default one's code.
 #if defined(__GNUC__) || defined(__clang__)
 #define LIGHTTRANSPORT_RESTRICT __restrict__
+#define LIGHTTRANSPORT_INLINE inline __attribute__((always_inline))
 #else
 #define LIGHTTRANSPORT_RESTRICT
+#define LIGHTTRANSPORT_INLINE inline
 #endif
 
 namespace lighttransport
