@@ -21,6 +21,9 @@ namespace
 /** A sink at or below this (relative to the largest diagonal) is none. */
 constexpr float NoSink = 1e-30f;
 
+/** From this tolerance on, memory counts more than the last few per cent of speed. */
+constexpr double FrugalTolerance = 1e-4;
+
 double now()
 {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -91,28 +94,6 @@ void applyDouble(const DoubleRow& row, double* LIGHTTRANSPORT_RESTRICT y)
   {
     y[i] += double(gx[i - 1]) * (x[i] - x[i - 1]);
   }
-}
-
-/** z = r / diagonal */
-void divideByDiagonal(
-  const DiffusionOperator& A, const float* r, float* z, const ParallelFor& parallelFor)
-{
-  const std::int64_t nx = A.dims[0];
-  const std::int64_t ny = A.dims[1];
-  ForEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int n)
-    {
-      const float* gx = A.g[0].data() + o;
-      const float* gy = A.g[1].data() + o;
-      const float* gyS = row % ny > 0 ? gy - nx : A.zeros.data();
-      const float* gz = A.g[2].data() + o;
-      const float* gzB = row / ny > 0 ? gz - nx * ny : A.zeros.data();
-      const float* s = A.s.data() + o;
-      for (int i = 0; i < n; ++i)
-      {
-        z[o + i] = r[o + i] / (gx[i] + gx[i - 1] + gy[i] + gyS[i] + gz[i] + gzB[i] + s[i]);
-      }
-    });
 }
 
 /** tau = step / diagonal, 0 where there is none. */
@@ -335,6 +316,28 @@ LIGHTTRANSPORT_SIMD
 void faceRow(int n, double factor, const double* a, const double* b, float* g)
 {
   facesOf(n, factor, a, b, g);
+}
+
+/** s = factor sigma, at least NoSink: a voxel without faces divides by it. sigma may be null. */
+template <class T>
+LIGHTTRANSPORT_INLINE void sinkOf(
+  int n, const T* LIGHTTRANSPORT_RESTRICT sigma, double factor, float* LIGHTTRANSPORT_RESTRICT s)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    const float v = sigma ? static_cast<float>(factor * static_cast<double>(sigma[i])) : 0.f;
+    s[i] = v > NoSink ? v : NoSink;
+  }
+}
+LIGHTTRANSPORT_SIMD
+void sinkRow(int n, const float* sigma, double factor, float* s)
+{
+  sinkOf(n, sigma, factor, s);
+}
+LIGHTTRANSPORT_SIMD
+void sinkRow(int n, const double* sigma, double factor, float* s)
+{
+  sinkOf(n, sigma, factor, s);
 }
 
 /**
@@ -628,7 +631,7 @@ DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
 }
 
 template <class T>
-void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Span> spans)
+void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Span> spans, bool anew)
 {
   const std::array<int, 3>& n = this->box.dims;
   const std::array<double, 3>& h = this->box.spacing;
@@ -639,8 +642,11 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
   { return outside && outside[i] ? T(0) : D[i]; };
 
   // 2. the operator
-  this->multigrid.release();
-  this->multigridReady = false;
+  if (anew)
+  {
+    this->multigrid.release();
+    this->multigridReady = false;
+  }
   const bool whole = spans.empty();
   this->A.allocate(n, whole ? Pages::Large : Pages::Small);
   if (!whole)
@@ -858,6 +864,7 @@ void DiffusionSolver::setShift(double value)
   {
     return;
   }
+  this->storeFaces();
   const std::int64_t size = this->box.size();
   if (this->sinkWithoutShift.empty())
   {
@@ -880,8 +887,104 @@ void DiffusionSolver::prepareMultigrid()
 {
   if (!this->multigridReady)
   {
+    this->storeFaces();
     this->multigrid.setup(this->A, this->parallelFor);
     this->multigridReady = true;
+  }
+}
+
+void DiffusionSolver::storeFaces()
+{
+  if (!this->A.isStored())
+  {
+    const bool ready = this->multigridReady; // it depends on the operator's values alone
+    const auto again = [this](const auto& medium)
+    {
+      if (medium.D)
+      {
+        const auto same = medium;
+        this->assemble(same, {}, false);
+      }
+    };
+    again(this->floatMedium);
+    again(this->doubleMedium);
+    this->multigridReady = ready;
+  }
+}
+
+template <class T>
+void DiffusionSolver::computeRow(
+  const DiffusionMedium<T>& medium, std::int64_t row, float* const g[3], float* s) const
+{
+  const std::array<int, 3>& n = this->box.dims;
+  const std::array<double, 3>& h = this->box.spacing;
+  const std::int64_t o = row * n[0];
+  const T* D = medium.D + o;
+  const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  const double inverse = 1. / this->scale;
+  for (int d = 0; d < 3; ++d)
+  {
+    const int open = d == 0 ? n[0] - 1 : at[d] + 1 < n[d] ? n[0] : 0;
+    faceRow(open, inverse / (h[d] * h[d]), D, D + stride[d], g[d]);
+    std::fill(g[d] + open, g[d] + n[0], 0.f);
+  }
+  sinkRow(n[0], medium.sigma_a ? medium.sigma_a + o : nullptr, inverse, s);
+  for (int d = 0; d < 3; ++d)
+  {
+    for (int side = 0; side < 2 && !this->border[d][side].empty(); ++side)
+    {
+      const float* out = this->border[d][side].data();
+      if (d == 0)
+      {
+        s[side ? n[0] - 1 : 0] += out[row];
+      }
+      else if (at[d] == (side ? n[d] - 1 : 0))
+      {
+        const float* along = out + static_cast<std::int64_t>(n[0]) * at[3 - d];
+        for (int i = 0; i < n[0]; ++i)
+        {
+          s[i] += along[i];
+        }
+      }
+    }
+  }
+}
+
+double DiffusionSolver::face(int d, std::int64_t i) const
+{
+  if (this->A.isStored())
+  {
+    return static_cast<double>(this->A.g[d][i]);
+  }
+  const std::array<int, 3>& n = this->box.dims;
+  const std::int64_t next = i +
+    (d == 0      ? 1
+        : d == 1 ? n[0]
+                 : static_cast<std::int64_t>(n[0]) * n[1]);
+  const double H = this->floatMedium.D
+    ? harmonicMean(this->floatMedium.D[i], this->floatMedium.D[next])
+    : harmonicMean(this->doubleMedium.D[i], this->doubleMedium.D[next]);
+  return H / (this->scale * this->box.spacing[d] * this->box.spacing[d]);
+}
+
+void DiffusionSolver::forgetFaces()
+{
+  // active regions, walls and time steps keep them
+  if (this->A.isStored() && this->A.spans.empty() && !this->anyWall && this->shift == 0.)
+  {
+    this->A.forget(
+      [this](std::int64_t row, float* const g[3], float* s)
+      {
+        if (this->floatMedium.D)
+        {
+          this->computeRow(this->floatMedium, row, g, s);
+        }
+        else
+        {
+          this->computeRow(this->doubleMedium, row, g, s);
+        }
+      });
   }
 }
 
@@ -1000,11 +1103,11 @@ double DiffusionSolver::residual(
       {
         std::fill(y, y + n, 0.);
       }
-      else if (exactly && !b.ofSteps && this->floatMedium.D)
+      else if ((exactly || !this->A.isStored()) && !b.ofSteps && this->floatMedium.D)
       {
         this->applyExactly(this->floatMedium, phi, row, o, n, y);
       }
-      else if (exactly && !b.ofSteps && this->doubleMedium.D)
+      else if ((exactly || !this->A.isStored()) && !b.ofSteps && this->doubleMedium.D)
       {
         this->applyExactly(this->doubleMedium, phi, row, o, n, y);
       }
@@ -1200,10 +1303,17 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
 
   this->prepareMultigrid();
   const DiffusionOperator& op = this->A;
-  Buffer<float> z(size, this->A.pages);
-  Buffer<float> p(size, this->A.pages);
+  // A rough answer is had with less memory: faces are computed, and z and A p share theirs.
+  const bool frugal = control.tolerance >= FrugalTolerance;
+  if (frugal)
+  {
+    this->forgetFaces();
+  }
   Buffer<float> Ap(size, this->A.pages);
-  report.bytes = std::max(report.bytes, this->bytesHeld() + op.activeSize * 24);
+  Buffer<float> own(frugal ? 0 : size, this->A.pages);
+  Buffer<float>& z = frugal ? Ap : own;
+  Buffer<float> p(size, this->A.pages);
+  report.bytes = std::max(report.bytes, this->bytesHeld() + op.activeSize * (frugal ? 20 : 24));
 
   const double rStart = rNorm;
   double replaced = rNorm; // the last recomputed norm
@@ -1211,6 +1321,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   int stalls = 0;
   double rz = 0.;
   double alpha = 0.;
+  double pScale = rScale; // p's unit
   bool restart = false;
   bool fresh = true;
   std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()), 0.);
@@ -1289,7 +1400,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     {
       // The coarse operators are not Galerkin's: where one is far too weak, the correction
       // overshoots. A step along r / diagonal always gains.
-      divideByDiagonal(op, r.data(), z.data(), loop);
+      DivideByDiagonal(op, r.data(), z.data(), loop);
       restart = true;
       ForEachRow(op, loop,
         [&](std::int64_t row, std::int64_t o, int n)
@@ -1302,13 +1413,17 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       report.message = "the preconditioned residual is not positive";
       return;
     }
-    const double beta = restart || iteration == 0 ? 0. : -alpha * zAp / rz;
+    // (where z has overwritten A p, Fletcher and Reeves's form; r was perhaps rescaled since)
+    const double beta = restart || iteration == 0 ? 0.
+      : frugal                                    ? rzNew / rz * (rScale / pScale)
+                                                  : -alpha * zAp / rz;
+    pScale = rScale;
     restart = false;
     rz = rzNew;
     // 4. alpha = r . z / p . A p, with A p = A z + beta A p_old but where the residual was
     //    recomputed: there A p is as well
     double pAp = 0.;
-    if (fresh)
+    if (fresh || frugal)
     {
       ForEachRow(op, loop,
         [&](std::int64_t, std::int64_t o, int n)
@@ -1949,6 +2064,7 @@ DiffusionReport DiffusionSolver::march(
   const double began = now();
   const std::int64_t size = this->box.size();
   const int nx = this->box.dims[0];
+  this->storeFaces();
   this->setShift(0.);
   const RightHandSide<T> b{ q, 1. / this->scale, true };
   const double qNorm = this->norm(b);
@@ -2039,8 +2155,7 @@ void DiffusionSolver::flux(const double* phi, T* E) const
             double high = 0.;
             if (at[d] > 0)
             {
-              low =
-                static_cast<double>(this->A.g[d][i - stride[d]]) * (phi[i - stride[d]] - phi[i]);
+              low = this->face(d, i - stride[d]) * (phi[i - stride[d]] - phi[i]);
             }
             else if (!this->border[d][0].empty())
             {
@@ -2050,7 +2165,7 @@ void DiffusionSolver::flux(const double* phi, T* E) const
             }
             if (at[d] + 1 < n[d])
             {
-              high = static_cast<double>(this->A.g[d][i]) * (phi[i] - phi[i + stride[d]]);
+              high = this->face(d, i) * (phi[i] - phi[i + stride[d]]);
             }
             else if (!this->border[d][1].empty())
             {

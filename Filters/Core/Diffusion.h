@@ -216,7 +216,15 @@ private:
   DiffusionReport check(const DiffusionMedium<T>& medium);
   /** Writes the operator, on the spans (all, where there are none). */
   template <class T>
-  void assemble(const DiffusionMedium<T>& medium, std::vector<Span> spans);
+  void assemble(const DiffusionMedium<T>& medium, std::vector<Span> spans, bool anew = true);
+  /** The operator's faces in memory, for set-up and time steps; or computed when they are read. */
+  void storeFaces();
+  void forgetFaces();
+  /** The conductance between voxel i and its next along axis d, which there is. */
+  double face(int d, std::int64_t i) const;
+  template <class T>
+  void computeRow(
+    const DiffusionMedium<T>& medium, std::int64_t row, float* const g[3], float* s) const;
   /** Whether the voxel one step along axis d, inside the box, belongs to the active region. */
   bool isActive(int d, const int at[3], int step) const;
 

@@ -562,8 +562,123 @@ int parityOf(const DiffusionOperator& A, std::int64_t row, std::int64_t begin, i
  * have rows that are neighbours, in space or in memory (that is why their number along y is 1 or
  * even). The tiles depend on the grid alone.
  */
-void skew(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor,
-  const std::function<void(int stage, std::int64_t row)>& body)
+using SkewBody = std::function<void(int stage, std::int64_t row, const RowFaces& faces)>;
+
+/** The faces and sinks of a tile's planes in turn, where they are not stored. */
+class FaceRing
+{
+public:
+  /** Room for `planes` planes of the rows [low, high). */
+  FaceRing(const DiffusionOperator& op, int planes, int low, int high)
+    : A(op)
+    , depth(planes)
+    , first(low)
+    , last(high)
+    , pitch((static_cast<std::size_t>(op.dims[0]) + 47) / 16 * 16)
+  {
+    static thread_local std::vector<float> room;
+    const std::size_t size =
+      4 * this->pitch * static_cast<std::size_t>(planes) * static_cast<std::size_t>(high - low) +
+      32;
+    if (room.size() < size)
+    {
+      room.assign(size, 0.f);
+    }
+    this->store = room.data() + 16;
+  }
+
+  void compute(int k)
+  {
+    for (int j = this->first; j < this->last; ++j)
+    {
+      float* const g[3] = { this->row(0, j, k), this->row(1, j, k), this->row(2, j, k) };
+      g[0][-1] = 0.f;
+      this->A.compute(j + static_cast<std::int64_t>(this->A.dims[1]) * k, g, this->row(3, j, k));
+    }
+  }
+  RowFaces faces(int j, int k) const
+  {
+    const float* zeros = this->A.zeros.data();
+    return { this->row(0, j, k), this->row(1, j, k), j > 0 ? this->row(1, j - 1, k) : zeros,
+      this->row(2, j, k), k > 0 ? this->row(2, j, k - 1) : zeros, this->row(3, j, k) };
+  }
+
+private:
+  float* row(int array, int j, int k) const
+  {
+    const std::size_t at = (static_cast<std::size_t>(k % this->depth) *
+                               static_cast<std::size_t>(this->last - this->first) +
+                             static_cast<std::size_t>(j - this->first)) *
+        4 +
+      static_cast<std::size_t>(array);
+    return this->store + at * this->pitch;
+  }
+  const DiffusionOperator& A;
+  int depth, first, last;
+  std::size_t pitch;
+  float* store;
+};
+
+/** The rows or planes of a tile at a stage, see skew. */
+struct TileRange
+{
+  int n, tile, tiles;
+  int at(int stage, bool end) const
+  {
+    const int edge = this->tile + (end ? 1 : 0);
+    if (edge == 0 || edge == this->tiles)
+    {
+      return edge == 0 ? 0 : this->n;
+    }
+    const int border = static_cast<int>(static_cast<std::int64_t>(this->n) * edge / this->tiles);
+    // odd tiles grow, even ones shrink
+    return border + ((this->tile % 2 == 1) == end ? stage : -stage);
+  }
+};
+
+void skewTile(const DiffusionOperator& A, int stages, const TileRange& y, const TileRange& z,
+  const SkewBody& body)
+{
+  const bool stored = A.isStored();
+  const int most = stages - 1;
+  const int first = std::min(z.at(0, false), z.at(most, false));
+  const int last = std::max(z.at(0, true), z.at(most, true));
+  const int low = std::max(0, std::min(y.at(0, false), y.at(most, false)) - 1);
+  const int high = std::max(y.at(0, true), y.at(most, true));
+  FaceRing ring(A, stored ? 0 : stages + 1, low, high);
+  if (!stored && first > 0)
+  {
+    ring.compute(first - 1);
+  }
+  for (int front = first; front < last + most; ++front)
+  {
+    if (!stored && front < last)
+    {
+      ring.compute(front);
+    }
+    for (int stage = 0; stage < stages; ++stage)
+    {
+      const int k = front - stage;
+      if (k < z.at(stage, false) || k >= z.at(stage, true))
+      {
+        continue;
+      }
+      for (int j = y.at(stage, false); j < y.at(stage, true); ++j)
+      {
+        const std::int64_t row = j + static_cast<std::int64_t>(A.dims[1]) * k;
+        const Span span = A.span(row);
+        if (span.begin < span.end)
+        {
+          body(stage, row,
+            stored ? facesOfRow(A, row, row * A.dims[0] + span.begin) : ring.faces(j, k));
+        }
+      }
+    }
+  }
+}
+
+void skew(
+  const DiffusionOperator& A, int stages, const ParallelFor& parallelFor, const SkewBody& body)
 {
   const int ny = A.dims[1];
   const int nz = A.dims[2];
@@ -574,7 +689,7 @@ void skew(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor
     const int height = std::max<int>(least, static_cast<int>(TileValues / A.dims[0]));
     if (ny >= 2 * height || nz < 2 * least)
     {
-      tiles[0] = std::max(1, ny / std::min(height, ny / 2) / 2 * 2);
+      tiles[0] = std::max(1, ny / std::max(1, std::min(height, ny / 2)) / 2 * 2);
     }
     tiles[1] = std::max(1, nz / std::max(least, TilePlanes));
   }
@@ -582,56 +697,42 @@ void skew(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor
   {
     const int odd[2] = { phase & 1, phase >> 1 };
     const int along[2] = { (tiles[0] + 1 - odd[0]) / 2, (tiles[1] + 1 - odd[1]) / 2 };
-    const int count = along[0] * along[1];
-    if (count == 0)
-    {
-      continue;
-    }
-    ForRows(parallelFor, count, A.activeSize,
+    ForRows(parallelFor, along[0] * along[1], A.activeSize,
       [&](std::int64_t begin, std::int64_t end)
       {
         for (std::int64_t t = begin; t < end; ++t)
         {
-          const int tile[2] = { 2 * static_cast<int>(t % along[0]) + odd[0],
-            2 * static_cast<int>(t / along[0]) + odd[1] };
-          const int n[2] = { ny, nz };
-          const auto range = [&](int d, int stage, int& from, int& to)
-          {
-            const int grow = odd[d] ? stage : -stage;
-            from = static_cast<int>(static_cast<std::int64_t>(n[d]) * tile[d] / tiles[d]);
-            to = static_cast<int>(static_cast<std::int64_t>(n[d]) * (tile[d] + 1) / tiles[d]);
-            from = tile[d] == 0 ? 0 : from - grow;
-            to = tile[d] + 1 == tiles[d] ? n[d] : to + grow;
-          };
-          int first = 0;
-          int last = 0;
-          range(1, odd[1] ? stages - 1 : 0, first, last);
-          for (int front = first; front < last + stages - 1; ++front)
-          {
-            for (int stage = 0; stage < stages; ++stage)
-            {
-              const int k = front - stage;
-              int from[2], to[2];
-              range(1, stage, from[1], to[1]);
-              if (k < from[1] || k >= to[1])
-              {
-                continue;
-              }
-              range(0, stage, from[0], to[0]);
-              for (int j = from[0]; j < to[0]; ++j)
-              {
-                const std::int64_t row = j + static_cast<std::int64_t>(ny) * k;
-                const Span span = A.span(row);
-                if (span.begin < span.end)
-                {
-                  body(stage, row);
-                }
-              }
-            }
-          }
+          skewTile(A, stages, { ny, 2 * static_cast<int>(t % along[0]) + odd[0], tiles[0] },
+            { nz, 2 * static_cast<int>(t / along[0]) + odd[1], tiles[1] }, body);
         }
       });
   }
+}
+
+/** The sum of what row(row, begin, n, faces) returns, in an order that threads do not change. */
+template <class Row>
+double sumFaces(const DiffusionOperator& A, const ParallelFor& parallelFor, const Row& row)
+{
+  std::vector<double> partial(
+    static_cast<std::size_t>(A.dims[1]) * static_cast<std::size_t>(A.dims[2]), 0.);
+  if (A.isStored())
+  {
+    ForEachRow(A, parallelFor,
+      [&](std::int64_t r, std::int64_t o, int n)
+      { partial[static_cast<std::size_t>(r)] = row(r, o, n, facesOfRow(A, r, o)); });
+  }
+  else
+  {
+    skew(A, 1, parallelFor,
+      [&](int, std::int64_t r, const RowFaces& faces)
+      { partial[static_cast<std::size_t>(r)] = row(r, r * A.dims[0], A.dims[0], faces); });
+  }
+  double sum = 0.;
+  for (const double p : partial)
+  {
+    sum += p;
+  }
+  return sum;
 }
 } // namespace
 
@@ -639,6 +740,7 @@ void skew(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor
 void DiffusionOperator::allocate(const std::array<int, 3>& n, Pages size)
 {
   this->pages = size;
+  this->compute = nullptr;
   this->dims = n;
   for (auto& faces : this->g)
   {
@@ -649,6 +751,16 @@ void DiffusionOperator::allocate(const std::array<int, 3>& n, Pages size)
   this->activeRows.clear();
   this->spans.clear();
   this->activeSize = this->size();
+}
+
+void DiffusionOperator::forget(ComputeRow how)
+{
+  this->compute = std::move(how);
+  for (auto& faces : this->g)
+  {
+    faces.release();
+  }
+  this->s.release();
 }
 
 void DiffusionOperator::restrictTo(std::vector<Span> rowSpans)
@@ -668,7 +780,7 @@ void DiffusionOperator::restrictTo(std::vector<Span> rowSpans)
 
 std::int64_t DiffusionOperator::bytes() const
 {
-  return 4 * static_cast<std::int64_t>(sizeof(float)) * this->activeSize +
+  return (this->isStored() ? 4 : 0) * static_cast<std::int64_t>(sizeof(float)) * this->activeSize +
     static_cast<std::int64_t>(
       this->spans.size() * sizeof(Span) + this->activeRows.size() * sizeof(std::int64_t));
 }
@@ -700,17 +812,32 @@ double SumEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, co
 
 double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor)
 {
-  return SumEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int n)
-    { return applyRow(n, facesOfRow(A, row, o), viewRow(A, x, row, o), y + o); });
+  return sumFaces(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n, const RowFaces& f)
+    { return applyRow(n, f, viewRow(A, x, row, o), y + o); });
 }
 
 double Advance(const DiffusionOperator& A, const float* z, float beta, float* p, float* y,
   const ParallelFor& parallelFor)
 {
-  return SumEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int n)
-    { return advanceRow(n, facesOfRow(A, row, o), viewRow(A, z, row, o), beta, p + o, y + o); });
+  return sumFaces(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n, const RowFaces& f)
+    { return advanceRow(n, f, viewRow(A, z, row, o), beta, p + o, y + o); });
+}
+
+void DivideByDiagonal(
+  const DiffusionOperator& A, const float* r, float* z, const ParallelFor& parallelFor)
+{
+  sumFaces(A, parallelFor,
+    [&](std::int64_t, std::int64_t o, int n, const RowFaces& f)
+    {
+      for (int i = 0; i < n; ++i)
+      {
+        z[o + i] =
+          r[o + i] / (f.gx[i] + f.gx[i - 1] + f.gy[i] + f.gyS[i] + f.gz[i] + f.gzB[i] + f.s[i]);
+      }
+      return 0.;
+    });
 }
 
 //------------------------------------------------------------------------------
@@ -1112,17 +1239,13 @@ Between between(const std::array<int, 3>& nc, const std::array<bool, 3>& halved,
 } // namespace
 
 void Multigrid::restrictRow(const DiffusionOperator& A, const Level& fine, Level& coarse,
-  std::int64_t row, const float* b, const float* x) const
+  std::int64_t row, float* r, std::size_t pitch) const
 {
   const std::array<int, 3>& n = A.dims;
   const DiffusionOperator& C = coarse.A;
   const Span span = A.span(row);
   const std::int64_t begin = row * n[0];
   const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-  std::size_t pitch = 0;
-  float* r = scratch(9, static_cast<std::size_t>(n[0]), pitch);
-  residualRow(span.end - span.begin, facesOfRow(A, row, begin + span.begin),
-    viewRow(A, x, row, begin + span.begin), b + begin + span.begin, r + span.begin);
   const MultigridLine line = this->lineOf(fine, at, begin);
   const Between rows = between(C.dims, fine.halved, at);
   float* bc = coarse.b.data();
@@ -1239,13 +1362,13 @@ void Multigrid::cycle(
   const DiffusionOperator& A = this->operatorOf(l);
   Level& fine = this->levels[l];
   Level* coarse = l + 1 < this->levels.size() ? &this->levels[l + 1] : nullptr;
-  const auto relax = [&](std::int64_t row, int colour)
+  const auto relax = [&](std::int64_t row, int colour, const RowFaces& faces)
   {
     const Span span = A.span(row);
     const std::int64_t o = row * A.dims[0] + span.begin;
     std::size_t pitch = 0;
-    relaxRow(span.end - span.begin, parityOf(A, row, o, colour), facesOfRow(A, row, o),
-      viewRow(A, x, row, o), b + o, scratch(1, static_cast<std::size_t>(A.dims[0]), pitch), x + o);
+    relaxRow(span.end - span.begin, parityOf(A, row, o, colour), faces, viewRow(A, x, row, o),
+      b + o, scratch(1, static_cast<std::size_t>(A.dims[0]), pitch), x + o);
   };
   const int half = 2 * this->sweeps;
   // 4. smooth: red then black; 3. restrict what is left
@@ -1256,22 +1379,25 @@ void Multigrid::cycle(
       { std::fill(coarse->b.data() + o, coarse->b.data() + o + n, 0.f); });
   }
   skew(A, coarse ? half + 1 : half, parallelFor,
-    [&](int stage, std::int64_t row)
+    [&](int stage, std::int64_t row, const RowFaces& faces)
     {
+      const Span span = A.span(row);
+      const int n = span.end - span.begin;
+      const std::int64_t o = row * A.dims[0] + span.begin;
       if (stage == 0)
       {
-        const Span span = A.span(row);
-        const std::int64_t o = row * A.dims[0] + span.begin;
-        startRow(
-          span.end - span.begin, parityOf(A, row, o, 0), facesOfRow(A, row, o), b + o, x + o);
+        startRow(n, parityOf(A, row, o, 0), faces, b + o, x + o);
       }
       else if (stage < half)
       {
-        relax(row, stage & 1);
+        relax(row, stage & 1, faces);
       }
       else
       {
-        this->restrictRow(A, fine, *coarse, row, b, x);
+        std::size_t pitch = 0;
+        float* r = scratch(9, static_cast<std::size_t>(A.dims[0]), pitch);
+        residualRow(n, faces, viewRow(A, x, row, o), b + o, r + span.begin);
+        this->restrictRow(A, fine, *coarse, row, r, pitch);
       }
     });
   if (coarse)
@@ -1282,14 +1408,14 @@ void Multigrid::cycle(
   const int shift = coarse ? 1 : 0;
   const int stages = half + shift;
   skew(A, stages, parallelFor,
-    [&](int stage, std::int64_t row)
+    [&](int stage, std::int64_t row, const RowFaces& faces)
     {
       if (stage < shift)
       {
         this->prolongRow(A, fine, *coarse, row, x);
         return;
       }
-      relax(row, (stage - shift + 1) & 1);
+      relax(row, (stage - shift + 1) & 1, faces);
       if (stage + 1 == stages && done)
       {
         const Span span = A.span(row);

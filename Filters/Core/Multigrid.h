@@ -71,6 +71,13 @@ struct DiffusionOperator
   Buffer<float> zeros; // a row, read in place of rows outside
 
   /**
+   * Where g and s are not stored: writes a row's, g[0] of its last value 0. The kernels then
+   * keep a few planes of them in the cache, which costs arithmetic and saves 16 bytes per value.
+   */
+  using ComputeRow = std::function<void(std::int64_t row, float* const g[3], float* s)>;
+  ComputeRow compute;
+
+  /**
    * Where the domain is a part of the box: its rows, and the span of each row of the box.
    * Coefficients and vectors are 0 elsewhere and their memory is not touched there. Empty: all.
    */
@@ -98,6 +105,9 @@ struct DiffusionOperator
                                : this->spans[static_cast<std::size_t>(row)];
   }
   void allocate(const std::array<int, 3>& n, Pages size = Pages::Large);
+  bool isStored() const { return !this->compute; }
+  /** Gives the memory of g and s back; from now on they are computed. Not with spans. */
+  void forget(ComputeRow how);
   /** Restricts the domain to the spans; before the coefficients are written. */
   void restrictTo(std::vector<Span> rowSpans);
   std::int64_t bytes() const;
@@ -112,6 +122,10 @@ double SumEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, co
 
 /** Gives a voxel with neither face nor sink the sink `s`, so that nothing divides by zero. */
 void CloseIsolated(DiffusionOperator& A, float s, const ParallelFor& parallelFor);
+
+/** z = r / diagonal */
+void DivideByDiagonal(
+  const DiffusionOperator& A, const float* r, float* z, const ParallelFor& parallelFor);
 
 /** y = A x and returns x . y; in float, with the sum in double. */
 double Apply(const DiffusionOperator& A, const float* x, float* y, const ParallelFor& parallelFor);
@@ -139,7 +153,7 @@ struct MultigridLine
 class Multigrid
 {
 public:
-  /** Builds the hierarchy for A, which must outlive it. */
+  /** Builds the hierarchy for A, which must outlive it and be stored for as long as this takes. */
   void setup(const DiffusionOperator& A, const ParallelFor& parallelFor);
   void release();
 
@@ -199,9 +213,12 @@ private:
   void gatherFaces(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
     int along, float* out, const ParallelFor& parallelFor) const;
   MultigridLine lineOf(const Level& fine, const int at[3], std::int64_t begin) const;
-  /** coarse.b += P^T (b - A x) of the row's red voxels; black ones have no residual. */
+  /**
+   * coarse.b += P^T r on the row's red voxels (black ones have no residual). r is a row of the
+   * box, and the first of nine with that pitch, the others for work.
+   */
   void restrictRow(const DiffusionOperator& A, const Level& fine, Level& coarse, std::int64_t row,
-    const float* b, const float* x) const;
+    float* r, std::size_t pitch) const;
   /** x += P coarse.x on the row's red voxels; black ones are relaxed next, whatever they are. */
   void prolongRow(const DiffusionOperator& A, const Level& fine, const Level& coarse,
     std::int64_t row, float* x) const;

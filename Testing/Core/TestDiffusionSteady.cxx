@@ -330,6 +330,88 @@ void flux(Suite& suite)
     LT_CHECK(suite, across == 0.);
   }
 }
+/** Noise over three decades with a source of either sign, at 33 x 40 x 44 or other sizes. */
+DiffusionScene noise(const std::array<int, 3>& dims, Boundary boundary)
+{
+  DiffusionScene scene(dims, { { 0.7, 1., 1.1 } });
+  scene.boundary = boundary;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> decades(-3., 0.);
+  for (std::size_t i = 0; i < scene.D.size(); ++i)
+  {
+    scene.D[i] = std::pow(10., decades(random));
+    scene.sigma_a[i] = 1e-2 * std::pow(10., decades(random));
+  }
+  scene.q[scene.q.size() / 3] = 1.;
+  scene.q[scene.q.size() / 2] = -0.2;
+  return scene;
+}
+
+/** The faces of a rough solve are computed when they are read: the same operator, less memory. */
+void frugal(Suite& suite)
+{
+  for (const Boundary boundary : { Boundary::Robin, Boundary::Absorbing, Boundary::ZeroFlux })
+  {
+    DiffusionScene scene = noise({ { 33, 40, 44 } }, boundary);
+    const double size = static_cast<double>(scene.grid.size());
+    DiffusionSolver solver(lighttransport::testing::ThreadedFor(3));
+    DiffusionControl control;
+    control.tolerance = 1e-4;
+    LT_CHECK(suite, solver.setMedium(scene.medium()).reason == StopReason::Converged);
+    const DiffusionReport rough = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+    std::cout << "frugal: " << static_cast<double>(rough.bytes) / size << " bytes per voxel, "
+              << rough.iterations << " iterations\n";
+    LT_CHECK(suite, rough.reason == StopReason::Converged);
+    LT_CHECK(suite, static_cast<double>(rough.bytes) <= 32. * size);
+    LT_CHECK_CLOSE(suite, scene.residual(), rough.residual, 1e-6);
+    LT_CHECK(suite, scene.residual() <= 1e-4);
+    // on with a sharper tolerance, and then with steps, which need the faces again
+    control.tolerance = 1e-9;
+    const DiffusionReport sharp = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite, sharp.reason == StopReason::Converged);
+    LT_CHECK(suite, scene.residual() <= 1e-9);
+    std::vector<double> computed(3 * scene.D.size());
+    solver.flux(scene.phi.data(), computed.data());
+    DiffusionScene other = noise({ { 33, 40, 44 } }, boundary);
+    DiffusionSolver fresh(SerialFor);
+    fresh.setMedium(other.medium());
+    std::vector<double> stored(computed.size());
+    fresh.flux(scene.phi.data(), stored.data());
+    double difference = 0.;
+    double largest = 0.;
+    for (std::size_t i = 0; i < stored.size(); ++i)
+    {
+      difference = std::max(difference, std::abs(stored[i] - computed[i]));
+      largest = std::max(largest, std::abs(stored[i]));
+    }
+    LT_CHECK(suite, difference <= 1e-6 * largest);
+    control.tolerance = 1e-6;
+    const DiffusionReport steps =
+      solver.stepExplicit(scene.q.data(), scene.phi.data(), 2, solver.positivityBound(), control);
+    LT_CHECK(suite, steps.reason == StopReason::Converged);
+  }
+}
+
+/** Tiles are an order of work, nothing more: long, flat and odd boxes converge as well. */
+void tiles(Suite& suite)
+{
+  for (const std::array<int, 3>& dims : { std::array<int, 3>{ { 37, 61, 29 } },
+         std::array<int, 3>{ { 5, 7, 1201 } }, std::array<int, 3>{ { 5, 1201, 7 } },
+         std::array<int, 3>{ { 1201, 5, 7 } }, std::array<int, 3>{ { 190, 190, 1 } },
+         std::array<int, 3>{ { 1, 190, 190 } }, std::array<int, 3>{ { 3, 130, 100 } } })
+  {
+    DiffusionScene scene = noise(dims, Boundary::Robin);
+    const DiffusionReport report = scene.solve(1e-8, lighttransport::testing::ThreadedFor(3));
+    std::cout << "tiles: " << dims[0] << " x " << dims[1] << " x " << dims[2] << ", "
+              << report.iterations << " iterations\n";
+    LT_CHECK(suite, report.reason == StopReason::Converged);
+    LT_CHECK(suite, scene.residual() <= 1e-8);
+    LT_CHECK(suite, report.iterations <= 25);
+    DiffusionScene alone = noise(dims, Boundary::Robin);
+    alone.solve(1e-8);
+    LT_CHECK(suite, alone.phi == scene.phi); // whatever the threads
+  }
+}
 } // namespace
 
 int main(int argc, char* argv[])
@@ -343,5 +425,7 @@ int main(int argc, char* argv[])
   invariants(suite);
   fresnel(suite);
   flux(suite);
+  frugal(suite);
+  tiles(suite);
   return suite.result();
 }
