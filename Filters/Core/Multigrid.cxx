@@ -631,8 +631,9 @@ struct TileRange
       return edge == 0 ? 0 : this->n;
     }
     const int border = static_cast<int>(static_cast<std::int64_t>(this->n) * edge / this->tiles);
-    // odd tiles grow, even ones shrink
-    return border + ((this->tile % 2 == 1) == end ? stage : -stage);
+    // odd tiles grow, even ones shrink; of two thin ones the odd one may come to have it all
+    const int moved = border + ((this->tile % 2 == 1) == end ? stage : -stage);
+    return std::min(std::max(moved, 0), this->n);
   }
 };
 
