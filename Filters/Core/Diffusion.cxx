@@ -1861,6 +1861,9 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
     }
     bool any = false;
     double leaked = 0.;
+    // of the border's open faces: all, the bright ones
+    std::int64_t faces = 0;
+    std::int64_t bright = 0;
     const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
     const auto D = [&](std::int64_t i)
     { return medium.outside && medium.outside[i] ? T(0) : medium.D[i]; };
@@ -1884,6 +1887,8 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
             const double g = harmonicMean(D(i), D(i + side * stride[d])) /
               (this->box.spacing[d] * this->box.spacing[d]);
             leaked += g * phi[i];
+            faces += g > 0.;
+            bright += g > 0. && std::abs(phi[i]) > std::sqrt(threshold) * largest;
             // what would stand beyond, were nothing lost there
             if (g > 0. && std::abs(phi[i]) > threshold * largest)
             {
@@ -1904,6 +1909,11 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
       }
     }
     report.leaked = leaked * this->box.voxelVolume();
+    // Bright all around: it will not end before the volume does.
+    if (2 * bright > faces)
+    {
+      active.assign(active.size(), 1);
+    }
     if (any && !(control.timeBudget > 0. && last))
     {
       last = false;
