@@ -431,7 +431,7 @@ bool vtkLightDiffusionFilter::CheckParameters(std::string& problem) const
     this->OutputPrecision != DEFAULT_PRECISION)
   {
     text << "OutputPrecision is " << this->OutputPrecision
-         << "; expected SINGLE_PRECISION or DOUBLE_PRECISION";
+         << "; expected SINGLE_PRECISION, DOUBLE_PRECISION or DEFAULT_PRECISION";
   }
   problem = text.str();
   return problem.empty();
@@ -952,7 +952,9 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
 
   // 4. the arrays
-  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION;
+  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
+    (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
+      this->TargetError < 1e-6);
   const double extreme = largestOf(phi.data(), size, parallel, bad);
   if (!toDouble && extreme > static_cast<double>(std::numeric_limits<float>::max()))
   {

@@ -338,8 +338,10 @@ public:
 
   ///@{
   /**
-   * Of Fluence and Flux: vtkAlgorithm::SINGLE_PRECISION (float, default) or DOUBLE_PRECISION.
-   * The solution is in double; a value beyond float's range is an error that says so.
+   * Of Fluence and Flux: vtkAlgorithm::SINGLE_PRECISION (float, default), DOUBLE_PRECISION, or
+   * DEFAULT_PRECISION: double where TargetError is below 1e-6, which float cannot hold, else float.
+   * The solution is in double; a value beyond float's range is an error that says so. VTK 9.1 has
+   * no array of halves: vtkLightFieldProperty stores them on the GPU.
    */
   vtkSetMacro(OutputPrecision, int);
   vtkGetMacro(OutputPrecision, int);

@@ -230,6 +230,10 @@ DiffusionReport CoarseDiffusion::setMedium(const DiffusionMedium<T>& medium, int
     this->coarse.dims[d] = (n[d] + this->factors[d] - 1) / this->factors[d];
     this->coarse.spacing[d] = this->factors[d] * h[d];
   }
+  for (this->shift = 0; 1 << this->shift < this->factors[0];)
+  {
+    ++this->shift;
+  }
 
   std::vector<double> most(static_cast<std::size_t>(n[1]) * n[2]);
   ForRows(this->parallelFor, static_cast<std::int64_t>(most.size()), this->fine.size(),
@@ -467,12 +471,12 @@ void CoarseDiffusion::facesAcross(int d, DiffusionOperator& C)
               float* layer = layers.data() + l * static_cast<std::size_t>(nc[0]);
               for (int i = 0; i < n[0]; ++i)
               {
-                layer[i / this->factors[0]] += row[i];
+                layer[i >> this->shift] += row[i];
               }
             }
             for (int i = 0; i < n[0]; ++i)
             {
-              parallel[static_cast<std::size_t>(i / this->factors[0])] +=
+              parallel[static_cast<std::size_t>(i >> this->shift)] +=
                 1.f / R[static_cast<std::size_t>(i)];
             }
             if (f == 1)
@@ -643,7 +647,7 @@ void CoarseDiffusion::sinks(DiffusionOperator& C)
               a.bottom()[i] * static_cast<float>(B[i]) + a.top()[i] * static_cast<float>(T[i]);
             const float den = a.den()[i] + sink[i];
             out[i] = den > LeastD ? num / (255.f * den) : 0.f;
-            float& b = best[static_cast<std::size_t>(i / this->factors[0])];
+            float& b = best[static_cast<std::size_t>(i >> this->shift)];
             b = std::max(b, out[i]);
           }
         }
@@ -656,9 +660,14 @@ void CoarseDiffusion::sinks(DiffusionOperator& C)
           const float* D = Ds.data() + static_cast<std::size_t>(at) * length;
           for (int i = 0; i < n[0]; ++i)
           {
-            const int I = i / this->factors[0];
+            const int I = i >> this->shift;
             const float b = best[static_cast<std::size_t>(I)];
             const float part = b > 0.f ? own[i] / b : 1.f;
+            this->psi[r * n[0] + i] = static_cast<std::uint8_t>(255.f * part + 0.5f);
+            if (!(sink[i] > 0.f))
+            {
+              continue;
+            }
             float fit = 0.f;
             for (int d = 0; d < 3; ++d)
             {
@@ -666,7 +675,6 @@ void CoarseDiffusion::sinks(DiffusionOperator& C)
               fit += fitted(std::min(sink[i] / g * part * part, 1e9f), this->factors[d]) / 3.f;
             }
             C.s[row * nc[0] + I] += sink[i] * part * fit;
-            this->psi[r * n[0] + i] = static_cast<std::uint8_t>(255.f * part + 0.5f);
           }
         }
       }
@@ -774,7 +782,7 @@ void CoarseDiffusion::restrict(const Q* q, double* b) const
         std::fill(out, out + nc[0], 0.);
         for (int i = 0; i < n[0]; ++i)
         {
-          out[i / f] += own[static_cast<std::size_t>(i)];
+          out[i >> this->shift] += own[static_cast<std::size_t>(i)];
           const int beside = f > 1 ? this->neighbour(0, i) : -1;
           if (beside >= 0 && beside < nc[0])
           {
@@ -787,6 +795,34 @@ void CoarseDiffusion::restrict(const Q* q, double* b) const
 
 namespace
 {
+/** A row of cells on its voxels: the own cell's value, and that of the cell beside it. */
+void spread(int n, int cells, int f, const double* LIGHTTRANSPORT_RESTRICT x,
+  double* LIGHTTRANSPORT_RESTRICT own, double* LIGHTTRANSPORT_RESTRICT beside)
+{
+  double before = 0.;
+  for (int I = 0; I < cells; ++I)
+  {
+    const double here = x[I];
+    const double after = I + 1 < cells ? x[I + 1] : 0.;
+    const int m = std::min(f, n - I * f);
+    if (f == 2 && m == 2)
+    {
+      own[2 * I] = own[2 * I + 1] = here;
+      beside[2 * I] = before;
+      beside[2 * I + 1] = after;
+    }
+    else
+    {
+      for (int p = 0; p < m; ++p)
+      {
+        own[I * f + p] = here;
+        beside[I * f + p] = 2 * p + 1 > m ? after : before;
+      }
+    }
+    before = here;
+  }
+}
+
 /** One row of 4. from the four rows of cells around it, spread along x by `u` and `s`. */
 LIGHTTRANSPORT_SIMD
 void prolongRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx, const std::uint8_t* wy,
@@ -846,18 +882,7 @@ void CoarseDiffusion::prolong(const double* x, double* phi) const
             : dark.data();
           double* u = store.data() + 2 * static_cast<std::size_t>(c) * length;
           double* s = u + length;
-          const int f = this->factors[0];
-          for (int I = 0; I < nc[0]; ++I)
-          {
-            const int m = this->cells(0, I);
-            const double before = I > 0 ? xc[I - 1] : 0.;
-            const double after = I + 1 < nc[0] ? xc[I + 1] : 0.;
-            for (int p = 0; p < m; ++p)
-            {
-              u[I * f + p] = xc[I];
-              s[I * f + p] = 2 * p + 1 > m ? after : before;
-            }
-          }
+          spread(n[0], nc[0], this->factors[0], xc, u, s);
           own[c] = u;
           next[c] = s;
         }
@@ -891,15 +916,15 @@ void CoarseDiffusion::equations(Around& a, std::int64_t r) const
   };
   border(0, 0);
   border(0, n[0] - 1);
-  for (int i = 0; i < n[0]; ++i)
+  const int borders[3] = { 0, (j == 0) + (j + 1 == n[1]), (k == 0) + (k + 1 == n[2]) };
+  for (int d = 1; d < 3; ++d)
   {
-    for (int side = 0; side < (j == 0) + (j + 1 == n[1]); ++side)
+    for (int side = 0; side < borders[d]; ++side)
     {
-      border(1, i);
-    }
-    for (int side = 0; side < (k == 0) + (k + 1 == n[2]); ++side)
-    {
-      border(2, i);
+      for (int i = 0; i < n[0]; ++i)
+      {
+        border(d, i);
+      }
     }
   }
 }

@@ -104,6 +104,7 @@ private:
   ParallelFor parallelFor;
   Grid fine, coarse;
   std::array<int, 3> factors{ { 1, 1, 1 } };
+  int shift = 0; // of factors[0], a power of 2 as all
   DiffusionMedium<float> floatMedium;
   DiffusionMedium<double> doubleMedium;
   double scale = 1.;

@@ -553,8 +553,8 @@ void coarser(Suite& suite)
   LT_CHECK(suite, coarse->GetOutput()->GetPointData()->GetArray("Flux") != nullptr);
   coarse->SetCoarseningFactor(3);
   const std::vector<std::string> errors = errorsOfUpdate(coarse);
-  LT_CHECK(suite,
-    errors.size() == 1 && errors[0].find("CoarseningFactor is 3") != std::string::npos);
+  LT_CHECK(
+    suite, errors.size() == 1 && errors[0].find("CoarseningFactor is 3") != std::string::npos);
 
   // a named error, and a light that moves
   coarse->SetCoarseningFactor(1);
@@ -580,6 +580,10 @@ void coarser(Suite& suite)
   coarse->Update();
   LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 1);
   LT_CHECK(suite, coarse->GetStopReason() == Filter::Converged); // to Tolerance
+  LT_CHECK(suite, pointArray(coarse, "Fluence")->GetDataType() == VTK_FLOAT);
+  coarse->SetOutputPrecision(vtkAlgorithm::DEFAULT_PRECISION); // float cannot hold that error
+  coarse->Update();
+  LT_CHECK(suite, pointArray(coarse, "Fluence")->GetDataType() == VTK_DOUBLE);
   LT_CHECK_CLOSE(suite, fluenceAt(coarse, 30, 15, 18), fluenceAt(full, 30, 15, 18), 1e-5);
 }
 
