@@ -1160,9 +1160,20 @@ int DefaultNumberOfDirections(int order)
 }
 
 //------------------------------------------------------------------------------
-bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 3>& w, float* v,
-  std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress)
+bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 3>& direction,
+  float* v, std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress)
 {
+  // Of any length: its square may be more than a number can hold.
+  std::array<double, 3> w = direction;
+  double largest = 0.;
+  for (const double component : w)
+  {
+    largest = std::max(largest, std::abs(component));
+  }
+  for (double& component : w)
+  {
+    component /= largest;
+  }
   // One direction, whose "coefficient" is v itself.
   const int sweep = SweepAxis(medium.grid, w);
   Buffer<float> transposed(sweep == 0 ? medium.grid.size() : 0);
@@ -1200,6 +1211,19 @@ bool VisibilityTowardsPoint(const VisibilityMedium& medium, const std::array<dou
   float* v, std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress)
 {
   const Grid& grid = medium.grid;
+  // So far away that all rays are parallel: a millionth of a voxel over the grid's length.
+  double farthest = 0.;
+  int longest = 1;
+  for (int a = 0; a < 3; ++a)
+  {
+    farthest = std::max(farthest, std::abs(place[a] / grid.spacing[a]));
+    longest = std::max(longest, grid.dims[a]);
+  }
+  if (farthest > 1e6 * longest * longest)
+  {
+    return VisibilityTowards({ grid, medium.sigma_t, 0. }, place, v, stride, parallel, progress);
+  }
+
   Buffer<float> transposed;
   int done = 0;
   for (int sweep = 0; sweep < 3; ++sweep)

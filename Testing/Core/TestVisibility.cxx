@@ -483,6 +483,16 @@ void invariants(Suite& suite)
   Values far(sigma_t.size());
   VisibilityTowardsPoint(
     { grid, sigma_t.data(), 0. }, { { 4e6, -7e6, 5e6 } }, far.data(), 1, SerialFor, nullptr);
+  // So far that nothing but its direction is left, and directions of any length.
+  for (const double length : { 1e30, 1e300 })
+  {
+    Values there(sigma_t.size());
+    VisibilityTowardsPoint({ grid, sigma_t.data(), 0. },
+      { { length * w[0], length * w[1], length * w[2] } }, there.data(), 1, SerialFor, nullptr);
+    const double small = 1. / length;
+    LT_CHECK(
+      suite, there == towards(grid, sigma_t, { { small * w[0], small * w[1], small * w[2] } }));
+  }
   double worst[4] = { 0., 0., 0., 0. };
   double mean = 0.;
   forEach(
