@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkLightTransportPolyDataMapper.h"
 
+#include "VolumeExtinction.h"
 #include "vtkLightTransportArrays.h"
 #include "vtkLightTransportCompat.h"
 #include "vtkLightTransportPolyDataMapperVisibility.h"
@@ -14,6 +15,7 @@
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
 #include "vtkExecutive.h"
+#include "vtkGPUVolumeRayCastMapper.h"
 #include "vtkImageData.h"
 #include "vtkLight.h"
 #include "vtkLightCollection.h"
@@ -31,6 +33,7 @@
 #include "vtkTextureObject.h"
 #include "vtkTrivialProducer.h"
 #include "vtkVersion.h"
+#include "vtkVolume.h"
 
 // GLEW or glad, by VTK's version.
 #include LIGHTTRANSPORT_GL_HEADER
@@ -124,6 +127,13 @@ public:
   vtkNew<vtkMatrix4x4> WorldToGC;
   vtkNew<vtkMatrix4x4> WorldToDC;
 
+  // Without a producer: of what the volume's mapper draws.
+  int Resolution = 128;
+  std::vector<double> DrawnKey;
+  std::string DrawnProblem;
+  vtkNew<vtkImageData> Drawn;
+  vtkNew<vtkVisibilityFactorFilter> Own;
+
   // Exact fields.
   vtkNew<vtkImageData> Medium; // the extinction alone
   vtkSmartPointer<vtkDataArray> Extinction;
@@ -143,10 +153,12 @@ public:
   {
     this->Filter->SphericalHarmonicsOff();
     this->Filter->SetInputData(this->Medium);
+    this->Own->SetInputData(this->Drawn);
+    this->Own->OutputExtinctionOn();
   }
 
-  static std::shared_ptr<SharedVisibility> Find(
-    vtkAlgorithm* producer, int port, vtkProp3D* volume, vtkOpenGLRenderWindow* window);
+  static std::shared_ptr<SharedVisibility> Find(vtkAlgorithm* producer, int port, vtkProp3D* volume,
+    int resolution, vtkOpenGLRenderWindow* window);
 
   void Release(vtkWindow* window)
   {
@@ -164,11 +176,12 @@ public:
 private:
   void FindLights(vtkRenderer* renderer, bool exact, vtkMatrix4x4* worldToData);
   std::string UpdateExact(vtkImageData* image);
+  std::string FindImage(vtkImageData*& image);
 };
 
 //------------------------------------------------------------------------------
-std::shared_ptr<SharedVisibility> SharedVisibility::Find(
-  vtkAlgorithm* producer, int port, vtkProp3D* volume, vtkOpenGLRenderWindow* window)
+std::shared_ptr<SharedVisibility> SharedVisibility::Find(vtkAlgorithm* producer, int port,
+  vtkProp3D* volume, int resolution, vtkOpenGLRenderWindow* window)
 {
   // Rendering has one thread.
   static std::vector<std::weak_ptr<SharedVisibility>> all;
@@ -179,7 +192,7 @@ std::shared_ptr<SharedVisibility> SharedVisibility::Find(
   {
     std::shared_ptr<SharedVisibility> shared = one.lock();
     if (shared->Producer == producer && shared->Port == port && shared->Volume == volume &&
-      shared->Window == window)
+      shared->Resolution == resolution && shared->Window == window)
     {
       return shared;
     }
@@ -188,6 +201,7 @@ std::shared_ptr<SharedVisibility> SharedVisibility::Find(
   shared->Producer = producer;
   shared->Port = port;
   shared->Volume = volume;
+  shared->Resolution = resolution;
   shared->Window = window;
   all.push_back(shared);
   return shared;
@@ -255,6 +269,20 @@ void SharedVisibility::FindLights(vtkRenderer* renderer, bool exact, vtkMatrix4x
 }
 
 //------------------------------------------------------------------------------
+/** The filter's error, or nothing. */
+std::string ErrorOfUpdate(vtkAlgorithm* filter)
+{
+  vtkNew<Collector> collector;
+  vtkNew<Collector> silent; // the executive's own
+  const unsigned long own = filter->AddObserver(vtkCommand::ErrorEvent, collector);
+  const unsigned long other = filter->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, silent);
+  filter->Update();
+  filter->RemoveObserver(own);
+  filter->GetExecutive()->RemoveObserver(other);
+  return collector->text;
+}
+
+//------------------------------------------------------------------------------
 std::string SharedVisibility::UpdateExact(vtkImageData* image)
 {
   vtkDataArray* extinction = image->GetPointData()->GetArray(vtkLightTransportArrays::Extinction);
@@ -265,27 +293,61 @@ std::string SharedVisibility::UpdateExact(vtkImageData* image)
     this->Medium->GetPointData()->AddArray(extinction);
     this->Extinction = extinction;
   }
-  vtkNew<Collector> collector;
-  vtkNew<Collector> silent; // the executive's own
-  const unsigned long own = this->Filter->AddObserver(vtkCommand::ErrorEvent, collector);
-  const unsigned long other =
-    this->Filter->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, silent);
-  this->Filter->Update();
-  this->Filter->RemoveObserver(own);
-  this->Filter->GetExecutive()->RemoveObserver(other);
-  return collector->text;
+  return ErrorOfUpdate(this->Filter);
+}
+
+//------------------------------------------------------------------------------
+std::string SharedVisibility::FindImage(vtkImageData*& image)
+{
+  if (this->Producer)
+  {
+    this->Producer->Update(this->Port);
+    image = vtkImageData::SafeDownCast(this->Producer->GetOutputDataObject(this->Port));
+    return image && image->GetNumberOfPoints() > 0
+      ? std::string()
+      : "the visibility of " + std::string(this->Producer->GetClassName()) +
+        " is empty, expected an image of a vtkVisibilityFactorFilter";
+  }
+  auto* volume = vtkVolume::SafeDownCast(this->Volume);
+  auto* mapper = volume ? vtkGPUVolumeRayCastMapper::SafeDownCast(volume->GetMapper()) : nullptr;
+  if (!mapper || mapper->GetNumberOfInputConnections(0) < 1)
+  {
+    return "there is no visibility and " +
+      std::string(mapper ? "the volume's mapper has no input"
+                         : "the volume has no vtkGPUVolumeRayCastMapper") +
+      ", expected a visibility or a volume to compute it from";
+  }
+  mapper->GetInputAlgorithm()->Update();
+  if (!vtkImageData::SafeDownCast(mapper->GetDataSetInput()))
+  {
+    return "the volume is no image, expected a vtkImageData";
+  }
+  const std::vector<double> key = VolumeExtinctionKey(mapper, volume, this->Resolution);
+  if (key != this->DrawnKey)
+  {
+    this->DrawnKey = key;
+    this->DrawnProblem = VolumeExtinction(mapper, volume, this->Resolution, this->Drawn);
+    this->Drawn->Modified();
+  }
+  if (!this->DrawnProblem.empty())
+  {
+    return this->DrawnProblem;
+  }
+  const std::string problem = ErrorOfUpdate(this->Own);
+  image = this->Own->GetOutput();
+  return problem.empty() && image->GetNumberOfPoints() == 0 ? "the visibility was not computed"
+                                                            : problem;
 }
 
 //------------------------------------------------------------------------------
 std::string SharedVisibility::Prepare(vtkRenderer* renderer)
 {
   vtkOpenGLRenderWindow* window = this->Window;
-  this->Producer->Update(this->Port);
-  auto* image = vtkImageData::SafeDownCast(this->Producer->GetOutputDataObject(this->Port));
-  if (!image || image->GetNumberOfPoints() < 1)
+  vtkImageData* image = nullptr;
+  std::string missing = this->FindImage(image);
+  if (!missing.empty())
   {
-    return "the visibility of " + std::string(this->Producer->GetClassName()) +
-      " is empty, expected an image of a vtkVisibilityFactorFilter";
+    return missing;
   }
   const auto arrayOf = [image](const char* name)
   {
@@ -493,10 +555,11 @@ void vtkLightTransportPolyDataMapper::RenderPieceStart(vtkRenderer* renderer, vt
   Implementation& internal = *this->Internal;
   internal.Active = false;
   internal.Defines.clear();
-  if (internal.Producer && (this->ShadowStrength > 0. || this->AmbientOcclusion > 0.))
+  if ((internal.Producer || internal.Volume) &&
+    (this->ShadowStrength > 0. || this->AmbientOcclusion > 0.))
   {
     internal.Shared = SharedVisibility::Find(internal.Producer, internal.Port, internal.Volume,
-      vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()));
+      this->VisibilityResolution, vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()));
     const std::string problem = internal.Shared->Prepare(renderer);
     this->ReportOnce(problem);
     internal.Active = problem.empty();
@@ -660,6 +723,7 @@ void vtkLightTransportPolyDataMapper::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Volume: " << this->Internal->Volume << "\n";
   os << indent << "ShadowStrength: " << this->ShadowStrength << "\n";
   os << indent << "AmbientOcclusion: " << this->AmbientOcclusion << "\n";
+  os << indent << "VisibilityResolution: " << this->VisibilityResolution << "\n";
   os << indent << "SurfaceOffset: " << this->SurfaceOffset << "\n";
   os << indent << "VisibilityUploads: " << this->GetNumberOfVisibilityUploads() << "\n";
 }

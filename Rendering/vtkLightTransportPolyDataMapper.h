@@ -22,18 +22,27 @@
  * Fragments beside the volume look along the ray to the light where it enters the
  * volume: the volume's shadow falls on a floor, too.
  *
+ * The volume says where its shadows are:
+ *
+ * @code
+ *   mapper->SetVolume(volume);   // a vtkVolume that a vtkGPUVolumeRayCastMapper draws
+ * @endcode
+ *
+ * computes them from what that mapper draws, opacities, masks, cropping and clipping
+ * included, whenever it changes. Or a visibility of one's own, which other mappers can
+ * share, SetVisibilityConnection of vtkLightTransportVolumeMapper among them:
+ *
  * @code
  *   vtkNew<vtkVisibilityFactorFilter> visibility;   // of the volume and its opacity
  *   visibility->OutputExtinctionOn();
  *   mapper->SetVisibilityConnection(visibility->GetOutputPort());
- *   volumeMapper->SetVisibilityConnection(visibility->GetOutputPort()); // the same for it
  * @endcode
  *
  * Mappers with the same connection and volume share sweeps and textures in a window.
  *
  * The arrays have one channel: RGB extinction is refused. A problem is reported once,
  * by vtkErrorMacro, and the surface then drawn without shadows. The picture is VTK's
- * own, to the pixel, without a visibility and with ShadowStrength and
+ * own, to the pixel, without a visibility and volume and with ShadowStrength and
  * AmbientOcclusion 0.
  *
  * Not for: shadows that surfaces cast (vtkShadowMapPass), composite data (the
@@ -65,7 +74,7 @@ public:
   /**
    * The visibility: an image with the point arrays VisibilitySH (1, 4, 9, 16 or 25
    * components), Extinction (one), or both. A connection is updated when a frame is
-   * drawn. nullptr (default): VTK's picture.
+   * drawn. nullptr (default): the volume's, or, without one, VTK's picture.
    */
   void SetVisibilityConnection(vtkAlgorithmOutput* output);
   void SetVisibilityData(vtkImageData* image);
@@ -73,12 +82,23 @@ public:
 
   ///@{
   /**
-   * The prop whose matrix places the visibility in the world, usually the vtkVolume.
-   * Default nullptr: its coordinates are the world's. Not reference counted by a
-   * cycle: the prop is kept alive.
+   * The volume in whose shadow the surface lies. Its matrix places the visibility in the
+   * world (without a volume its coordinates are the world's); without a visibility of
+   * one's own it is computed from what the mapper of this vtkVolume draws. Default
+   * nullptr. The prop is kept alive.
    */
   void SetVolume(vtkProp3D* volume);
   vtkProp3D* GetVolume();
+  ///@}
+
+  ///@{
+  /**
+   * Points along the longest axis of the visibility that is computed here: the volume's
+   * own, or every second, third... of them so that there are at most this many. At least
+   * 8, default 128.
+   */
+  vtkSetClampMacro(VisibilityResolution, int, 8, VTK_INT_MAX);
+  vtkGetMacro(VisibilityResolution, int);
   ///@}
 
   ///@{
@@ -127,6 +147,7 @@ protected:
   double ShadowStrength = 1.;
   double AmbientOcclusion = 1.;
   double SurfaceOffset = 0.;
+  int VisibilityResolution = 128;
 
 private:
   class Implementation;

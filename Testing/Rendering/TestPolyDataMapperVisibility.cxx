@@ -16,11 +16,13 @@
 #include "vtkLightTransportVolumeMapper.h"
 #include "vtkNIFTIImageReader.h"
 #include "vtkPiecewiseFunction.h"
+#include "vtkPlane.h"
 #include "vtkPlaneSource.h"
 #include "vtkPointData.h"
 #include "vtkPolyDataMapper.h"
 #include "vtkProperty.h"
 #include "vtkRenderer.h"
+#include "vtkSmartVolumeMapper.h"
 #include "vtkSphereSource.h"
 #include "vtkVisibilityFactorFilter.h"
 #include "vtkVolume.h"
@@ -396,6 +398,53 @@ void turned(Suite& suite)
   LT_CHECK(suite, difference(picture, capture(directed.window)).mean < 1.);
 }
 
+/** From what a volume's mapper draws: its opacity, its matrix, its clipping planes. */
+void drawn(Suite& suite)
+{
+  // Opacity 0.1 per unit distance of 2: sigma = -ln(0.9) / 2.
+  const double sigma = -std::log(0.9) / 2.;
+  auto image = medium([](double, double, double) { return 100.; });
+  image->GetPointData()->SetActiveScalars("Extinction");
+  vtkNew<vtkSmartVolumeMapper> none;
+  vtkNew<vtkLightTransportVolumeMapper> volumeMapper;
+  volumeMapper->SetInputData(image);
+  vtkNew<vtkPiecewiseFunction> opacity;
+  opacity->AddPoint(0., 0.1);
+  opacity->AddPoint(200., 0.1);
+  vtkNew<vtkVolume> volume;
+  volume->SetMapper(volumeMapper);
+  volume->GetProperty()->SetScalarOpacity(opacity);
+  volume->GetProperty()->SetScalarOpacityUnitDistance(2.);
+  Scene scene(8.);
+  scene.mapper->SetVolume(volume);
+  LT_CHECK_NEAR(suite, scene.middle(), std::exp(-sigma * 24.), 0.01);
+  volume->SetPosition(0., 0., -10.);
+  LT_CHECK_NEAR(suite, scene.middle(), std::exp(-sigma * 14.), 0.01);
+  volume->SetPosition(0., 0., 0.);
+  opacity->RemoveAllPoints();
+  opacity->AddPoint(0., 0.2);
+  opacity->AddPoint(200., 0.2);
+  LT_CHECK_NEAR(suite, scene.middle(), std::exp(0.5 * std::log(0.8) * 24.), 0.01);
+  scene.mapper->SetVisibilityResolution(16);
+  LT_CHECK_NEAR(suite, scene.middle(), std::exp(0.5 * std::log(0.8) * 24.), 0.02);
+  vtkNew<vtkPlane> plane;
+  plane->SetOrigin(0., 0., 20.);
+  plane->SetNormal(0., 0., -1.); // what lies below stays
+  volumeMapper->AddClippingPlane(plane);
+  LT_CHECK_NEAR(suite, scene.middle(), std::exp(0.5 * std::log(0.8) * 12.), 0.03);
+  LT_CHECK(suite, openGLErrors().empty());
+
+  // A mapper that is none of the GPU's: VTK's picture and one error.
+  vtkNew<Log> log;
+  scene.mapper->AddObserver(vtkCommand::ErrorEvent, log);
+  volume->SetMapper(none);
+  LT_CHECK_NEAR(suite, scene.middle(), 1., 0.01);
+  LT_CHECK(suite, log->messages.size() == 1);
+  scene.mapper->SetVolume(nullptr);
+  LT_CHECK_NEAR(suite, scene.middle(), 1., 0.01);
+  LT_CHECK(suite, log->messages.size() == 1);
+}
+
 void updates(Suite& suite)
 {
   Scene scene(16.);
@@ -634,6 +683,7 @@ int main(int argc, char* argv[])
   harmonics(suite);
   beside(suite);
   turned(suite);
+  drawn(suite);
   updates(suite);
   badInput(suite);
   head(suite);
