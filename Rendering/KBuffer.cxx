@@ -511,6 +511,17 @@ void KBuffer::BeginGeometry(int low, int high)
 }
 
 //------------------------------------------------------------------------------
+void KBuffer::BeginVolume()
+{
+  vtkOpenGLState* state = this->Window->GetState();
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  // The mapper copies the depth from what is bound for reading, and draws its box.
+  this->DepthTarget->Bind(vtkOpenGLFramebufferObject::GetReadMode());
+  state->vtkglEnable(GL_CULL_FACE);
+  state->vtkglCullFace(GL_BACK);
+}
+
+//------------------------------------------------------------------------------
 vtkTypeInt64 KBuffer::EndGeometry()
 {
   this->OpaqueDepth->Deactivate();

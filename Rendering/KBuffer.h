@@ -94,6 +94,7 @@ public:
 
   double SceneLength = 1.;               // diagonal of what is translucent
   void BeginGeometry(int low, int high); // 2: clears, binds
+  void BeginVolume();                    // what is there already can be read
   vtkTypeInt64 EndGeometry();            // how many nodes were asked for
   std::string OrderAndMatch(int low, int high, vtkTypeInt64 nodes); // 3, 4
   bool Blend(int first, int last);                                  // 5

@@ -7,6 +7,8 @@
 #include "vtkBucketedKBufferExtensions.h"
 #include "vtkBucketedKBufferFlatNormal.h"
 #include "vtkBucketedKBufferStore.h"
+#include "vtkBucketedKBufferVolumeDec.h"
+#include "vtkBucketedKBufferVolumeSample.h"
 #include "vtkCurvatureOpacityPolyDataMapper.h"
 #include "vtkCurvatureOpacityProperty.h"
 
@@ -20,6 +22,7 @@
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLActor.h"
 #include "vtkOpenGLError.h"
+#include "vtkOpenGLGPUVolumeRayCastMapper.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLRenderer.h"
 #include "vtkOpenGLState.h"
@@ -34,6 +37,7 @@
 #include "vtkTextureObject.h"
 #include "vtkTranslucentPass.h"
 #include "vtkVersion.h"
+#include "vtkVolume.h"
 
 #include <algorithm>
 #include <array>
@@ -84,6 +88,9 @@ public:
   std::string FailedTag;
   vtkTypeInt64 Merged = 0; // -1: to be read
 
+  vtkSmartPointer<vtkRenderPass> VolumetricPass; // of the steps, VTK's
+  std::vector<vtkProp*> Volumes;                 // that are drawn among the surfaces, this frame
+
   // between frames
   int Bands = 1;
   std::string ShaderKey;
@@ -95,6 +102,7 @@ public:
     this->Merged = std::max<vtkTypeInt64>(this->Merged, 0);
   }
   void FindShapes(vtkProp** props, int count);
+  void FindVolumes(vtkProp** props, int count);
 };
 
 vtkStandardNewMacro(vtkBucketedKBufferPass::vtkTranslucentStep);
@@ -156,11 +164,35 @@ void vtkBucketedKBufferPass::vtkInternals::FindShapes(vtkProp** props, int count
 }
 
 //------------------------------------------------------------------------------
+/** The volumes, if there are surfaces to be among and all of their mappers can do it. */
+void vtkBucketedKBufferPass::vtkInternals::FindVolumes(vtkProp** props, int count)
+{
+  this->Volumes.clear();
+  bool all = std::any_of(props, props + count,
+    [](vtkProp* prop) { return prop->HasTranslucentPolygonalGeometry() != 0; });
+  for (int i = 0; all && i < count; ++i)
+  {
+    if (auto* volume = vtkVolume::SafeDownCast(props[i]))
+    {
+      auto* mapper = vtkOpenGLGPUVolumeRayCastMapper::SafeDownCast(volume->GetMapper());
+      all = mapper && mapper->GetImageSampleDistance() == 1.F && !mapper->GetRenderToImage() &&
+        !mapper->GetUseDepthPass();
+      this->Volumes.push_back(volume);
+    }
+  }
+  if (!all)
+  {
+    this->Volumes.clear();
+  }
+}
+
+//------------------------------------------------------------------------------
 vtkBucketedKBufferPass::vtkBucketedKBufferPass()
   : Internals(new vtkInternals)
 {
   this->Internals->Step->Owner = this;
   this->Internals->Steps->SetTranslucentPass(this->Internals->Step);
+  this->Internals->VolumetricPass = this->Internals->Steps->GetVolumetricPass();
   this->SetActiveDrawBuffers(1);
 }
 
@@ -243,8 +275,12 @@ void vtkBucketedKBufferPass::RenderEverything(const vtkRenderState* s)
     renderer->SetPass(this);
     return;
   }
-  this->Internals->Steps->Render(s);
-  this->NumberOfRenderedProps = this->Internals->Steps->GetNumberOfRenderedProps();
+  vtkInternals& self = *this->Internals;
+  self.FindVolumes(s->GetPropArray(), s->GetPropArrayCount());
+  self.Steps->SetVolumetricPass(self.Volumes.empty() ? self.VolumetricPass.Get() : nullptr);
+  self.Steps->Render(s);
+  self.Volumes.clear();
+  this->NumberOfRenderedProps = self.Steps->GetNumberOfRenderedProps();
 }
 
 //------------------------------------------------------------------------------
@@ -262,6 +298,7 @@ void vtkBucketedKBufferPass::RenderFallback(const vtkRenderState* s, const std::
     self.Fallback = vtkSmartPointer<vtkDualDepthPeelingPass>::New();
   }
   self.Fallback->SetTranslucentPass(self.TranslucentPass);
+  self.Fallback->SetVolumetricPass(self.Volumes.empty() ? nullptr : self.VolumetricPass.Get());
   self.Fallback->SetMaximumNumberOfPeels(this->NumberOfLayers);
   self.Fallback->SetOcclusionRatio(0.);
   self.Fallback->Render(s);
@@ -338,7 +375,8 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
     now.curvatureScale =
       this->CurvatureScale > 0. ? this->CurvatureScale : buffer.SceneLength / 40.;
   }
-  const std::string shaderKey = buffer.Defines(1);
+  const std::string shaderKey =
+    buffer.Defines(1) + (self.Volumes.empty() ? "" : std::to_string(now.layers));
   if (self.ShaderKey != shaderKey)
   {
     self.ShaderKey = shaderKey;
@@ -443,6 +481,11 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
   {
     buffer.BeginGeometry(low, high);
     translucent->Render(s);
+    for (vtkProp* volume : this->Internals->Volumes)
+    {
+      buffer.BeginVolume();
+      volume->RenderVolumetricGeometry(s->GetRenderer());
+    }
     nodes = buffer.EndGeometry();
     ++this->NumberOfGeometryPasses;
     if (nodes <= buffer.Capacity)
@@ -487,10 +530,47 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
 }
 
 //------------------------------------------------------------------------------
+// Volumes: VTK's tags are still there.
+bool vtkBucketedKBufferPass::PreReplaceShaderValues(std::string& /*vertexShader*/,
+  std::string& /*geometryShader*/, std::string& fragmentShader, vtkAbstractMapper* mapper,
+  vtkProp* /*prop*/)
+{
+  if (!vtkVolumeMapper::SafeDownCast(mapper))
+  {
+    return true;
+  }
+  vtkInternals& self = *this->Internals;
+  const std::string room = std::to_string(self.Buffer.Now.layers);
+  const std::string store = "\nltStoreSegment(in_scale, in_bias);\n";
+  const std::string parts[5][3] = {
+    { "//VTK::System::Dec", "", std::string("\n") + vtkBucketedKBufferExtensions },
+    { "//VTK::ComputeLighting::Dec",
+      self.Buffer.Defines(1) + "#define LT_VOLUME_SURFACES " + room + "\n" +
+        vtkBucketedKBufferData + vtkBucketedKBufferStore + vtkBucketedKBufferVolumeDec,
+      "" },
+    { "//VTK::Shading::Init", "", "\nltFindSurfaces();\n" },
+    { "//VTK::Shading::Impl", vtkBucketedKBufferVolumeSample, "" },
+    { "//VTK::Shading::Exit", "", store },
+  };
+  for (const auto& part : parts)
+  {
+    if (!vtkShaderProgram::Substitute(fragmentShader, part[0], part[1] + part[0] + part[2], false))
+    {
+      self.FailedTag = part[0];
+    }
+  }
+  return true;
+}
+
+//------------------------------------------------------------------------------
 bool vtkBucketedKBufferPass::PostReplaceShaderValues(std::string& /*vertexShader*/,
   std::string& /*geometryShader*/, std::string& fragmentShader, vtkAbstractMapper* mapper,
   vtkProp* /*prop*/)
 {
+  if (vtkVolumeMapper::SafeDownCast(mapper))
+  {
+    return true;
+  }
   vtkInternals& self = *this->Internals;
   const auto substitute = [&](const char* tag, const std::string& with)
   {
@@ -546,6 +626,7 @@ bool vtkBucketedKBufferPass::SetShaderParameters(vtkShaderProgram* program,
 {
   vtkInternals& self = *this->Internals;
   KBuffer& buffer = self.Buffer;
+  buffer.OpaqueDepth->Activate(); // a volume's uploads may have bound another one here
   program->SetUniformi("ltOpaqueDepth", buffer.OpaqueDepth->GetTextureUnit());
   program->SetUniformi("ltWidth", buffer.Now.size[0]);
   program->SetUniformi("ltCapacity", static_cast<int>(buffer.Capacity));
@@ -555,6 +636,13 @@ bool vtkBucketedKBufferPass::SetShaderParameters(vtkShaderProgram* program,
     "ltThin", actor && actor->GetProperty()->GetRepresentation() != VTK_SURFACE ? 1 : 0);
   if (!buffer.Now.style)
   {
+    return true;
+  }
+  if (vtkVolumeMapper::SafeDownCast(mapper))
+  {
+    // Of no surface; without a normal nothing is styled.
+    program->SetUniformi("ltStyle", 0);
+    program->SetUniformi("ltShape", MostShapes - 1);
     return true;
   }
   unsigned int style = 0;

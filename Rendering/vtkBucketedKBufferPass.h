@@ -78,8 +78,13 @@
  *   steps->SetOpaquePass(ssao);
  * @endcode
  *
- * Not for: volumes, which are drawn after the surfaces as VTK does by default;
- * antialiasing (like VTK's own translucent passes it samples once per pixel).
+ * Volumes among the surfaces: where the renderer's pass is this one, and both are
+ * there, what a ray gathers between two surfaces becomes a fragment of its own, so that
+ * each hides what is behind it. For mappers that are vtkOpenGLGPUVolumeRayCastMapper
+ * (ours too) with an ImageSampleDistance of 1; with any other, volumes are drawn after
+ * the surfaces as VTK does by default. N surfaces in a volume are up to 2 N + 1 layers.
+ *
+ * Not for: antialiasing (like VTK's own translucent passes it samples once per pixel).
  * Hardware selection is VTK's own.
  *
  * @sa vtkCurvatureOpacityProperty vtkCurvatureOpacityPolyDataMapper vtkDualDepthPeelingPass
@@ -224,6 +229,8 @@ public:
 
   ///@{
   /** Not to be called by users: what the translucent props' shaders get. */
+  bool PreReplaceShaderValues(std::string& vertexShader, std::string& geometryShader,
+    std::string& fragmentShader, vtkAbstractMapper* mapper, vtkProp* prop) override;
   bool PostReplaceShaderValues(std::string& vertexShader, std::string& geometryShader,
     std::string& fragmentShader, vtkAbstractMapper* mapper, vtkProp* prop) override;
   bool SetShaderParameters(vtkShaderProgram* program, vtkAbstractMapper* mapper, vtkProp* prop,

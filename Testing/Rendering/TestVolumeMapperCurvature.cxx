@@ -8,6 +8,7 @@
 #include "VolumeMapperScene.h"
 
 #include "vtkActor.h"
+#include "vtkBucketedKBufferPass.h"
 #include "vtkContourValues.h"
 #include "vtkCurvatureOpacityFunction.h"
 #include "vtkMatrix3x3.h"
@@ -343,7 +344,7 @@ void oriented(Suite& suite)
 
 /**
  * Three translucent squares in a homogeneous medium, each seen through what lies before it,
- * by VTK's depth peeling for volumes.
+ * by VTK's depth peeling for volumes and by the k-buffer.
  */
 void betweenSurfaces(Suite& suite)
 {
@@ -373,8 +374,12 @@ void betweenSurfaces(Suite& suite)
   }
   vtkNew<vtkVolumeCurvatureProperty> property;
   property->SetOpacityFunction(constant(0.5));
-  for (int curved = 0; curved < 2; ++curved)
+  vtkNew<vtkBucketedKBufferPass> pass;
+  for (int kind = 0; kind < 4; ++kind)
   {
+    // By VTK's depth peeling and by the k-buffer, as it is and with half the extinction.
+    const bool curved = kind % 2 == 1;
+    scene.renderer->SetPass(kind < 2 ? nullptr : pass.Get());
     scene.mapper->SetCurvatureProperty(curved ? property.Get() : nullptr);
     for (double side : { -1., 1. })
     {
