@@ -1109,6 +1109,7 @@ DiffusionReport CoarseDiffusion::solve(
   Change last;
   double spent = 0.; // by a correction
   double shown = began;
+  double lastRate = 0.;
   bool shrinking = true;
   for (int i = 0; whole && i < (named ? most : fixed); ++i)
   {
@@ -1151,7 +1152,9 @@ DiffusionReport CoarseDiffusion::solve(
     const auto rate = [i](double here, double there)
     { return i > 0 ? std::min(1., std::max(0.12, here / std::max(there, 1e-30))) : 0.5; };
     const double rateL2 = rate(change.l2, last.l2);
-    const double rateP95 = std::max(rate(change.p95, last.p95), 0.8 * rateL2);
+    const double rateP95 =
+      std::max({ rate(change.p95, last.p95), 0.8 * rateL2, i > 1 ? 0.7 * lastRate : 0. });
+    lastRate = std::min(rateP95, 0.7);
     report.estimatedError = 1.1 * change.p95 * rateP95 / std::max(0.1, 1. - rateP95);
     report.estimatedErrorL2 = 1.1 * change.l2 * rateL2 / std::max(0.1, 1. - rateL2);
     shrinking = i < 2 || change.p95 < 0.7 * last.p95 || change.l2 < 0.7 * last.l2;

@@ -14,6 +14,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.ticker import NullFormatter  # noqa: E402
 
 
 def read(folder, name):
@@ -41,6 +42,9 @@ def draw_knobs(folder):
                 [max(float(row["p95"]), 1e-8) for row in points],
                 marker="o", markersize=3, linewidth=1, label=knob)
         axis.set_title(scene, fontsize=8)
+        ticks = [25, 50, 100, 200, 400, 800]
+        axis.set_xticks(ticks, [str(tick) for tick in ticks])
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_xlabel("ms", fontsize=8)
         axis.tick_params(labelsize=7)
         axis.grid(True, which="major", linewidth=0.3)
