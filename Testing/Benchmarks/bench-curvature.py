@@ -15,6 +15,7 @@ import lighttransport as lt
 from vtkmodules import vtkRenderingOpenGL2, vtkRenderingVolumeOpenGL2  # noqa: F401
 from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
+from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkImagingCore import vtkImageResample
 from vtkmodules.vtkIOImage import vtkNIFTIImageReader, vtkPNGWriter
 from vtkmodules.vtkIOPLY import vtkPLYReader
@@ -64,11 +65,14 @@ def functions():
     write(picture, "curvature-functions")
 
 
-def show(prop, position, up, zoom, name):
+def show(prop, position, up, zoom, name, more=(), render_pass=None):
     renderer = vtkRenderer()
     renderer.AddViewProp(prop)
+    for another in more:
+        renderer.AddViewProp(another)
+    renderer.SetPass(render_pass)
     renderer.SetBackground(0, 0, 0)
-    renderer.SetUseDepthPeeling(True)
+    renderer.SetUseDepthPeeling(not more)
     renderer.SetMaximumNumberOfPeels(50)
     renderer.SetOcclusionRatio(0)
     window = vtkRenderWindow()
@@ -152,6 +156,32 @@ def engine():
         volume.SetMapper(mapper)
         volume.SetProperty(prop)
         show(volume, (0.7, 1, 0.45), (0, 0, 1), 1.5, "curvature-" + name)
+        if name == "dense-constant":
+            balls = spheres(image)
+            for after, render_pass in (("default", None), ("k-buffer", lt.vtkBucketedKBufferPass())):
+                name = "volume-among-surfaces-" + after
+                show(volume, (0.7, 1, 0.45), (0, 0, 1), 1.5, name, balls, render_pass)
+
+
+def spheres(image):
+    low_x, high_x, low_y, high_y, low_z, high_z = image.GetBounds()
+    actors = []
+    for color, side in (((0.2, 0.9, 0.3), -1), ((0.3, 0.4, 1), 1)):
+        source = vtkSphereSource()
+        source.SetRadius(60)
+        source.SetThetaResolution(40)
+        source.SetPhiResolution(40)
+        source.SetCenter(
+            (low_x + high_x) / 2 + 48 * side, (low_y + high_y) / 2 + 24 * side, (low_z + high_z) / 2
+        )
+        mapper = vtkPolyDataMapper()
+        mapper.SetInputConnection(source.GetOutputPort())
+        actor = vtkActor()
+        actor.SetMapper(mapper)
+        actor.GetProperty().SetColor(*color)
+        actor.GetProperty().SetOpacity(0.35)
+        actors.append(actor)
+    return actors
 
 
 def blade():
