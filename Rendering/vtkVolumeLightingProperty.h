@@ -152,7 +152,7 @@ public:
   ///@{
   /**
    * How far before a surface, along its normal, visibility is looked up: in voxels of
-   * the visibility's grid, in [0,10] (clamped), default 2. With 0 the first layer of
+   * the visibility's grid, in [0,10] (clamped), default 3. With 0 the first layer of
    * voxels already shadows the surface that it is, as single scattering in a cloud
    * has it: opaque surfaces then have half their brightness. So does, towards the eye,
    * what is opaque within this length (from an optical depth of 1 on, fully from 4
@@ -230,7 +230,7 @@ protected:
   double Metallic = 0.;
   double Anisotropy = 0.;
   double GradientThreshold = 0.;
-  double SurfaceOffset = 2.;
+  double SurfaceOffset = 3.;
   double AmbientOcclusion = 1.;
   double EnvironmentStrength = 0.;
   bool Deferred = false;
