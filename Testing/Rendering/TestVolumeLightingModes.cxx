@@ -114,8 +114,7 @@ int main(int argc, char* argv[])
     const double without = psnr(bright, traced);
     std::cout << name << ": " << quality << " dB, without shadows " << without << "\n";
     check(quality >= 30., "precomputed against traced shadows " + std::to_string(quality) + " dB");
-    check(
-      !shadows || quality > without + 8., "better than no shadows, " + std::to_string(without));
+    check(!shadows || quality > without + 8., "better than no shadows, " + std::to_string(without));
     if (name == "composite" || name == "isosurface")
     {
       lighting->SetShadowModeToPrecomputed();
