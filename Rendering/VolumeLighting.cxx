@@ -422,6 +422,13 @@ bool VolumeLighting::UploadExact(vtkOpenGLRenderWindow* window, int exactLights,
   const vtkIdType points = image->GetNumberOfPoints();
   std::vector<unsigned char> bytes(static_cast<std::size_t>(points) * 4, 255);
   const int own = exact ? exact->GetNumberOfComponents() : 0;
+  const auto floatsOf = [](vtkDataArray* array)
+  {
+    return array && array->GetDataType() == VTK_FLOAT && array->HasStandardMemoryLayout()
+      ? static_cast<const float*>(array->GetVoidPointer(0))
+      : nullptr;
+  };
+  const float* fast = floatsOf(exact);
   vtkSMPTools::For(0, points, 65536,
     [&](vtkIdType begin, vtkIdType end)
     {
@@ -429,7 +436,7 @@ bool VolumeLighting::UploadExact(vtkOpenGLRenderWindow* window, int exactLights,
       {
         for (int c = 0; c < std::min(own, 4); ++c)
         {
-          bytes[4 * i + c] = toByte(exact->GetComponent(i, c));
+          bytes[4 * i + c] = toByte(fast ? fast[i * own + c] : exact->GetComponent(i, c));
         }
         if (mean)
         {
