@@ -551,7 +551,7 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
     vtkBucketedKBufferPixel;
   const auto run = [&](ComputeProgram& program, int stage, const std::string& body)
   {
-    const std::string problem = program.Use(head + body);
+    std::string problem = program.Use(head + body);
     if (problem.empty())
     {
       const Uniforms uniforms(program);

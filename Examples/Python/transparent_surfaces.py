@@ -5,8 +5,9 @@
 
 For each scene a picture in FOLDER: constant opacity | shading by curvature | opacity by
 curvature, with the transfer functions drawn in (shading over kappa from -1 to 1; opacity
-over |kappa| to the right and depth upwards). The assembly is made here; the other
-scenes need turbineblade.ply, cortex_left.ply, ct_avm.nii.gz and mr_head.nii.gz in --data. Headless
+over |kappa| to the right and depth upwards); and the four kinds of lines. The assembly is
+made here; the others need turbineblade.ply, cortex_left.ply, ct_avm.nii.gz,
+mr_head.nii.gz and bunny.ply in --data. Headless
 machines need nothing more.
 """
 
@@ -236,6 +237,27 @@ def draw_in(renderer, image, x, y):
     renderer.AddActor2D(actor)
 
 
+def view_from(renderer, camera):
+    view = renderer.GetActiveCamera()
+    view.SetViewUp(*camera["up"])
+    view.SetFocalPoint(0.0, 0.0, 0.0)
+    view.SetPosition(*camera["from"])
+    renderer.ResetCamera()
+    view.Zoom(camera["zoom"])
+    renderer.ResetCameraClippingRange()
+
+
+def write(window, name):
+    window.Render()
+    grab = vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    writer = vtkPNGWriter()
+    writer.SetFileName(os.path.join(options.folder, name + ".png"))
+    writer.SetInputConnection(grab.GetOutputPort())
+    writer.Write()
+
+
 def picture_of(name, parts, camera, kind, scale=0.0, opacity=0.4):
     size = options.size
     window = vtkRenderWindow()
@@ -257,13 +279,7 @@ def picture_of(name, parts, camera, kind, scale=0.0, opacity=0.4):
         style.GetOpacityFunction().SetKind(kind)
         for actor in actors_of(parts, opacity):
             renderer.AddActor(actor)
-        view = renderer.GetActiveCamera()
-        view.SetViewUp(*camera["up"])
-        view.SetFocalPoint(0.0, 0.0, 0.0)
-        view.SetPosition(*camera["from"])
-        renderer.ResetCamera()
-        view.Zoom(camera.get("zoom", 1.4))
-        renderer.ResetCameraClippingRange()
+        view_from(renderer, camera)
         if i >= 1:
             ramp = vtkImageData()
             ramp.SetDimensions(64, 8, 1)
@@ -278,18 +294,36 @@ def picture_of(name, parts, camera, kind, scale=0.0, opacity=0.4):
             style.GetOpacityFunction().ExportTable(table, 64, 64)
             draw_in(renderer, table, 6, 20)
         window.AddRenderer(renderer)
-    window.Render()
-    grab = vtkWindowToImageFilter()
-    grab.SetInput(window)
-    grab.ReadFrontBufferOff()
-    writer = vtkPNGWriter()
-    writer.SetFileName(os.path.join(options.folder, name + ".png"))
-    writer.SetInputConnection(grab.GetOutputPort())
-    writer.Write()
+    write(window, name)
     print(
         f"{name}: {passes[2].GetNumberOfFragments()} fragments, "
         f"{passes[2].GetNumberOfMergedFragments()} merged"
     )
+
+
+def lines_of(name, source, camera):
+    """Occluding contours | suggestive contours | ridges, valleys | demarcating curves."""
+    size = options.size
+    window = vtkRenderWindow()
+    window.SetMultiSamples(0)
+    window.SetSize(4 * size, size)
+    for i in range(4):
+        renderer = vtkRenderer()
+        renderer.SetViewport(i / 4.0, 0.0, (i + 1) / 4.0, 1.0)
+        renderer.SetBackground(1.0, 1.0, 1.0)
+        the_pass = lt.vtkBucketedKBufferPass()
+        renderer.SetPass(the_pass)
+        style = the_pass.GetCurvatureOpacityProperty()
+        style.SetOccludingContours(True)
+        style.SetSuggestiveContours(i == 1)
+        style.SetRidgesAndValleys(i == 2)
+        style.SetDemarcatingCurves(i == 3)
+        for actor in actors_of([(source, (0.9, 0.9, 0.85), True)], 1.0):
+            actor.ForceTranslucentOn()  # opaque ones take part so
+            renderer.AddActor(actor)
+        view_from(renderer, camera)
+        window.AddRenderer(renderer)
+    write(window, name)
 
 
 os.makedirs(options.folder, exist_ok=True)
@@ -329,4 +363,10 @@ if os.path.exists(os.path.join(options.data, "mr_head.nii.gz")):
         Opacity.CurvatureOnly,
         2.0,
         0.3,
+    )
+if os.path.exists(os.path.join(options.data, "bunny.ply")):
+    lines_of(
+        "lines",
+        with_normals(mesh("bunny.ply"), 180.0),
+        {"from": (0.0, 0.0, 1.0), "up": (0.0, 1.0, 0.0), "zoom": 1.4},
     )

@@ -8,6 +8,7 @@
  */
 #include "KBufferScene.h"
 
+#include "vtkColorTransferFunction.h"
 #include "vtkCurvatureOpacityFunction.h"
 #include "vtkCurvatureOpacityProperty.h"
 #include "vtkParametricFunctionSource.h"
@@ -362,6 +363,29 @@ void testOpacity(Suite& suite)
 }
 } // namespace
 
+/** Mean-curvature shading in colours: of the flat middle that at kappa = 0. */
+void testColors(Suite& suite)
+{
+  KBufferScene scene;
+  Layer square;
+  square.color = { 1., .5, 1., .6 };
+  scene.add({ square });
+  vtkNew<vtkColorTransferFunction> colors;
+  colors->AddRGBPoint(-1., 1., 0., 0.);
+  colors->AddRGBPoint(0., .2, .4, .8);
+  colors->AddRGBPoint(1., 0., 0., 1.);
+  scene.pass->GetCurvatureOpacityProperty()->SetShadingColors(colors);
+  scene.pass->GetCurvatureOpacityProperty()->CurvatureShadingOn();
+  const auto pixels = scene.capture();
+  const double expected[3] = { .2, .5 * .4, .8 };
+  const double background[3] = { toByte(.2), toByte(.4), toByte(.1) };
+  for (int c = 0; c < 3; ++c)
+  {
+    LT_CHECK_NEAR(suite, double(pixels[4 * (15 * 40 + 20) + c]),
+      255. * (.6 * expected[c] + .4 * background[c]), 1.);
+  }
+}
+
 /** Radiance scaling leaves flat parts, brightens what is convex and faces the eye. */
 void testRadianceScaling(Suite& suite)
 {
@@ -402,6 +426,7 @@ int main(int argc, char* argv[])
   testOutline(suite);
   testInvariance(suite);
   testOpacity(suite);
+  testColors(suite);
   testRadianceScaling(suite);
   return suite.result();
 }

@@ -158,7 +158,7 @@ void testClosedForm(Suite& suite)
     if (way == Banded)
     {
       scene.pass->SetMemoryLimit(1 << 20);
-      scene.window->SetSize(200, 150);
+      scene.window->SetSize(100, 75);
       mapper->SetSampleDistance(.004F);
       scene.add(randomLayers(12, 3, .0001, .0002)); // many, all but invisible
     }
