@@ -231,7 +231,7 @@ void testMany(Suite& suite)
 {
   {
     // 100 000 shapes, each a triangle of about a pixel.
-    KBufferScene scene(64, 64);
+    KBufferScene scene(48, 48);
     auto data = grid(224);
     const vtkIdType cells = data->GetNumberOfCells();
     LT_CHECK(suite, cells > 100000);
@@ -253,9 +253,6 @@ void testMany(Suite& suite)
     LT_CHECK(suite, mapper->GetNumberOfShapes() == cells);
     // No pixel has a neighbour of its shape: all outline, opaque white.
     LT_CHECK(suite, *std::min_element(pixels.begin(), pixels.end()) >= 252);
-    mapper->SetShapeIdArray("");
-    const auto one = scene.capture();
-    LT_CHECK(suite, std::count(one.begin(), one.end(), 255) < 64 * 64 * 2);
     LT_CHECK(suite, scene.log->messages.empty() && openGLErrors().empty());
   }
   {
