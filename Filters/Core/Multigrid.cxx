@@ -17,6 +17,9 @@ using Weights = MultigridWeights;
 constexpr std::int64_t TileValues = 12288;
 constexpr int TilePlanes = 16;
 
+/** A coarse diagonal is at least this part of Galerkin's, see Multigrid::raise. */
+constexpr float LeastPart = 0.7f;
+
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
 {
@@ -407,6 +410,85 @@ void maskFacesRow(int count, int x, int n, float noResistance, const float* g, s
   if (last >= 0 && last < count && (n & 1) == 1)
   {
     above[last] = noResistance;
+  }
+}
+
+/** The weights of a row's voxels for their own coarse column (a) and its neighbour's (b). */
+LIGHTTRANSPORT_SIMD
+void weightRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept, const Weights& x,
+  const Weights& y, const Weights& z, float* LIGHTTRANSPORT_RESTRICT a,
+  float* LIGHTTRANSPORT_RESTRICT b)
+{
+  constexpr float unit = 1.f / 255.f;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx = x.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy = y.here;
+  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz = z.here;
+  const float cy = y.factor, sy = 2.f * y.slope, cz = z.factor, sz = 2.f * z.slope;
+  for (int i = 0; i < n; ++i)
+  {
+    const float t = unit * static_cast<float>(kept[i]) * (cy + sy * static_cast<float>(wy[i])) *
+      (cz + sz * static_cast<float>(wz[i]));
+    const float u = t * unit * static_cast<float>(wx[i]);
+    a[i] = t - u;
+    b[i] = u;
+  }
+}
+
+/** The energy of two rows' weights on the faces g between them. */
+LIGHTTRANSPORT_SIMD
+void energyAcross(int n, const float* LIGHTTRANSPORT_RESTRICT g,
+  const float* LIGHTTRANSPORT_RESTRICT a0, const float* LIGHTTRANSPORT_RESTRICT b0,
+  const float* LIGHTTRANSPORT_RESTRICT a1, const float* LIGHTTRANSPORT_RESTRICT b1,
+  float* LIGHTTRANSPORT_RESTRICT own, float* LIGHTTRANSPORT_RESTRICT next)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    const float a = a0[i] - a1[i];
+    const float b = b0[i] - b1[i];
+    own[i] += g[i] * a * a;
+    next[i] += g[i] * b * b;
+  }
+}
+
+/** The energy of a row's weights on the faces along it, from voxel 0 on. */
+LIGHTTRANSPORT_SIMD
+void energyAlong(int n, bool halved, const float* LIGHTTRANSPORT_RESTRICT g,
+  const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b,
+  float* LIGHTTRANSPORT_RESTRICT own, float* LIGHTTRANSPORT_RESTRICT next)
+{
+  if (!halved)
+  {
+    for (int i = 0; i < n; ++i)
+    {
+      own[i] += (g[i] + g[i - 1]) * a[i] * a[i];
+    }
+    return;
+  }
+  for (int i = 0; i < n; ++i)
+  {
+    // the face above an odd voxel lies between columns, the one above an even voxel inside one
+    const float odd = static_cast<float>(i & 1);
+    const float above = a[i] - (odd * b[i + 1] + (1.f - odd) * a[i + 1]);
+    const float below = (1.f - odd) * (b[i - 1] - a[i]);
+    own[i] += g[i] * above * above + g[i - 1] * below * below;
+    next[i] += (odd * g[i - 1] + (1.f - odd) * g[i]) * b[i] * b[i];
+  }
+}
+
+/** Raises a coarse row's sinks where its diagonal is below a part of the energy: own and next. */
+LIGHTTRANSPORT_SIMD
+void raiseRow(int begin, int end, bool halved, float part, const float* own, const float* next,
+  const RowFaces& f, float* LIGHTTRANSPORT_RESTRICT s)
+{
+  for (int i = begin; i < end; ++i)
+  {
+    const float energy =
+      halved ? own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2] : own[i];
+    const int at = i - begin;
+    const float diagonal =
+      f.gx[at] + f.gx[at - 1] + f.gy[at] + f.gyS[at] + f.gz[at] + f.gzB[at] + s[at];
+    const float missing = part * energy - diagonal;
+    s[at] += missing > 0.f ? missing : 0.f;
   }
 }
 
@@ -1048,6 +1130,7 @@ void Multigrid::coarsen(
       keepRow(length, tie, A.s.data() + o, fine.kept.data() + o, felt.data() + o);
     });
   gather(A, fine, coarse.A, felt.data(), nullptr, -1, coarse.A.s.data(), parallelFor);
+  this->raise(A, fine, coarse.A, parallelFor);
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
 }
@@ -1126,6 +1209,78 @@ void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Diff
         out[row * nc[0] + i] =
           fine.halved[0] ? own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2] : own[i];
       }
+    });
+}
+
+void Multigrid::raise(const DiffusionOperator& A, const Level& fine, DiffusionOperator& C,
+  const ParallelFor& parallelFor) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const std::array<int, 3>& nc = C.dims;
+  const std::int64_t plane = static_cast<std::int64_t>(n[0]) * n[1];
+  ForEachRow(C, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int length)
+    {
+      // weights a and b of up to 4 x 4 fine rows, with rows of zeros around
+      static thread_local std::vector<float> store;
+      const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
+      store.assign((2 * 36 + 2) * room, 0.f);
+      const auto weights = [&](int jj, int kk, int which)
+      { return store.data() + 2 + static_cast<std::size_t>(2 * (6 * kk + jj) + which) * room; };
+      float* own = store.data() + 2 + 72 * room;
+      float* next = own + room;
+      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+      const Footprint rows = this->footprint(fine, n, J, -1);
+      for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+      {
+        for (int j = rows.first[1]; j <= rows.last[1]; ++j)
+        {
+          const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+          if (span.begin < span.end)
+          {
+            const std::int64_t f = span.begin + static_cast<std::int64_t>(n[0]) * j + plane * k;
+            const int at[3] = { 0, j, k };
+            Weights w[3];
+            this->weigh(fine, at, J, f, -1, 0, w);
+            const int jj = j - rows.first[1] + 1;
+            const int kk = k - rows.first[2] + 1;
+            weightRow(span.end - span.begin, fine.kept.data() + f, w[0], w[1], w[2],
+              weights(jj, kk, 0) + span.begin, weights(jj, kk, 1) + span.begin);
+          }
+        }
+      }
+      for (int k = rows.first[2] - 1; k <= rows.last[2]; ++k)
+      {
+        for (int j = rows.first[1] - 1; j <= rows.last[1]; ++j)
+        {
+          if (j < 0 || k < 0)
+          {
+            continue; // no voxels, no faces
+          }
+          const int jj = j - rows.first[1] + 1;
+          const int kk = k - rows.first[2] + 1;
+          const std::int64_t f = static_cast<std::int64_t>(n[0]) * j + plane * k;
+          const float* a = weights(jj, kk, 0);
+          const float* b = weights(jj, kk, 1);
+          if (jj > 0 && kk > 0)
+          {
+            energyAlong(n[0], fine.halved[0], A.g[0].data() + f, a, b, own, next);
+            energyAcross(n[0], A.s.data() + f, a, b, weights(0, 0, 0), weights(0, 0, 1), own, next);
+          }
+          if (kk > 0)
+          {
+            energyAcross(n[0], A.g[1].data() + f, a, b, weights(jj + 1, kk, 0),
+              weights(jj + 1, kk, 1), own, next);
+          }
+          if (jj > 0)
+          {
+            energyAcross(n[0], A.g[2].data() + f, a, b, weights(jj, kk + 1, 0),
+              weights(jj, kk + 1, 1), own, next);
+          }
+        }
+      }
+      raiseRow(static_cast<int>(o - row * nc[0]), static_cast<int>(o - row * nc[0]) + length,
+        fine.halved[0], LeastPart, own, next, facesOfRow(C, row, o), C.s.data() + o);
     });
 }
 

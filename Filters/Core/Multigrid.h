@@ -23,7 +23,9 @@
  *   3. The prolongation puts a voxel, along each axis, between its parent and its
  *      parent's neighbour by the balance of flux along the line that joins them, and
  *      lowers it by what its own sink takes; a coarse sink is what is felt of the
- *      sinks through those lines. The restriction is the transpose.
+ *      sinks through those lines. The restriction is the transpose. Where all of a coarse
+ *      voxel's lines are closed but light still comes round a corner, its correction would
+ *      be far too long: its diagonal is raised to a part of the diagonal of P^T A P.
  *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after the
  *      coarse correction, twice each. After a red-black sweep only red voxels have a
  *      residual, and only they need a correction.
@@ -208,6 +210,9 @@ private:
    */
   void gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
     const float* v, const std::uint8_t* kept, int along, float* out,
+    const ParallelFor& parallelFor) const;
+  /** Raises coarse sinks where the diagonal is far below that of P^T A P, see 3. above. */
+  void raise(const DiffusionOperator& A, const Level& fine, DiffusionOperator& C,
     const ParallelFor& parallelFor) const;
   /** The coarse faces along an axis that is halved, see 2. above. */
   void gatherFaces(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
