@@ -18,7 +18,7 @@ constexpr std::int64_t TileValues = 12288;
 constexpr int TilePlanes = 16;
 
 /** A coarse diagonal is at least this part of Galerkin's, see Multigrid::raise. */
-constexpr float LeastPart = 0.7f;
+constexpr float LeastPart = 1.f;
 
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
@@ -1221,21 +1221,36 @@ void Multigrid::raise(const DiffusionOperator& A, const Level& fine, DiffusionOp
   ForEachRow(C, parallelFor,
     [&](std::int64_t row, std::int64_t o, int length)
     {
-      // weights a and b of up to 4 x 4 fine rows, with rows of zeros around
+      // weights a and b of up to 4 x 4 fine rows; beyond them zeros
       static thread_local std::vector<float> store;
       const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
-      store.assign((2 * 36 + 2) * room, 0.f);
-      const auto weights = [&](int jj, int kk, int which)
-      { return store.data() + 2 + static_cast<std::size_t>(2 * (6 * kk + jj) + which) * room; };
-      float* own = store.data() + 2 + 72 * room;
+      store.resize(std::max(store.size(), 36 * room));
+      float* zeros = store.data() + 2;
+      float* own = zeros + room;
       float* next = own + room;
+      std::fill(store.data(), store.data() + 3 * room, 0.f);
       const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
       const Footprint rows = this->footprint(fine, n, J, -1);
+      // jj and kk count from 1
+      const auto weights = [&](int jj, int kk, int which)
+      {
+        const bool inside = jj >= 1 && jj <= rows.last[1] - rows.first[1] + 1 && kk >= 1 &&
+          kk <= rows.last[2] - rows.first[2] + 1;
+        return inside
+          ? own + static_cast<std::size_t>(2 * (4 * (kk - 1) + jj - 1) + which + 2) * room
+          : zeros;
+      };
       for (int k = rows.first[2]; k <= rows.last[2]; ++k)
       {
         for (int j = rows.first[1]; j <= rows.last[1]; ++j)
         {
           const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+          for (int which = 0; which < 2; ++which)
+          {
+            float* to = weights(j - rows.first[1] + 1, k - rows.first[2] + 1, which);
+            std::fill(to - 2, to + (span.begin < span.end ? span.begin : n[0] + 2), 0.f);
+            std::fill(to + (span.begin < span.end ? span.end : 0), to + n[0] + 2, 0.f);
+          }
           if (span.begin < span.end)
           {
             const std::int64_t f = span.begin + static_cast<std::int64_t>(n[0]) * j + plane * k;
@@ -1265,7 +1280,7 @@ void Multigrid::raise(const DiffusionOperator& A, const Level& fine, DiffusionOp
           if (jj > 0 && kk > 0)
           {
             energyAlong(n[0], fine.halved[0], A.g[0].data() + f, a, b, own, next);
-            energyAcross(n[0], A.s.data() + f, a, b, weights(0, 0, 0), weights(0, 0, 1), own, next);
+            energyAcross(n[0], A.s.data() + f, a, b, zeros, zeros, own, next);
           }
           if (kk > 0)
           {
