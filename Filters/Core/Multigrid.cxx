@@ -18,7 +18,7 @@ constexpr std::int64_t TileValues = 12288;
 constexpr int TilePlanes = 16;
 
 /** A coarse diagonal is at least this part of Galerkin's, see Multigrid::raise. */
-constexpr float LeastPart = 1.f;
+constexpr float LeastPart = 0.3f;
 
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
