@@ -118,7 +118,7 @@ std::string vtkVolumeCurvatureFilter::Compute(
   namespace image = vtkLightTransportImage;
 
   // Input and parameters.
-  const std::string problem = image::Problem(input);
+  std::string problem = image::Problem(input);
   if (!problem.empty())
   {
     return problem;

@@ -46,7 +46,6 @@ constexpr int TexelsPerLight = 5;
 
 /** Names of the arrays of vtkVisibilityFactorFilter. */
 constexpr const char* HarmonicsName = "VisibilitySH";
-constexpr const char* OcclusionName = "AmbientOcclusion";
 constexpr const char* ExactName = "Visibility";
 constexpr const char* ExtinctionName = "Extinction";
 

@@ -91,7 +91,7 @@ struct Options
   double TissueOpacity = -1.;                   // < 0: the preset's
   std::vector<double> KeyLight = { -40., 40. }; // azimuth, elevation, from the viewer
   double ShadowStrength = .85;
-  std::vector<double> Camera;                   // azimuth, elevation, zoom
+  std::vector<double> Camera; // azimuth, elevation, zoom
   std::string Up = "z";
   Curve TransferFunction;
   std::string Title;

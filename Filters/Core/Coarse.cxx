@@ -324,7 +324,7 @@ void CoarseDiffusion::facesAlongX(DiffusionOperator& C)
                 const float r = 1.f / std::max(D[I * f + p], LeastD);
                 lowR += low(p, m) * r;
                 highR += (1.f - low(p, m)) * r;
-                layers[static_cast<std::size_t>(I * f + p)] += D[I * f + p];
+                layers[static_cast<std::size_t>(std::int64_t{ f } * I + p)] += D[I * f + p];
               }
               below[static_cast<std::size_t>(I)] = lowR;
               above[static_cast<std::size_t>(I)] = highR;
@@ -338,7 +338,7 @@ void CoarseDiffusion::facesAlongX(DiffusionOperator& C)
               }
               const float R = (I >= 0 ? above[static_cast<std::size_t>(I)] : this->beyond[0]) +
                 (I + 1 < nc[0] ? below[static_cast<std::size_t>(I) + 1] : this->beyond[0]);
-              parallel[static_cast<std::size_t>(I + 1)] += 1.f / R;
+              parallel[static_cast<std::size_t>(I) + 1] += 1.f / R;
               if (f == 1)
               {
                 continue;
@@ -392,11 +392,12 @@ void CoarseDiffusion::facesAlongX(DiffusionOperator& C)
             for (int p = 0; p < m; ++p)
             {
               const float part = side ? low(p, m) : 1.f - low(p, m);
-              series += part / std::max(layers[static_cast<std::size_t>(cell * f + p)], LeastD);
+              series += part /
+                std::max(layers[static_cast<std::size_t>(std::int64_t{ f } * cell + p)], LeastD);
             }
           }
           const float g = this->perD[0] *
-            between(parallel[static_cast<std::size_t>(I + 1)], 1.f / std::max(series, LeastD));
+            between(parallel[static_cast<std::size_t>(I) + 1], 1.f / std::max(series, LeastD));
           const std::int64_t c = row * nc[0];
           (inside ? C.g[0][c + I] : C.s[c + (I < 0 ? 0 : I)]) += g;
         }

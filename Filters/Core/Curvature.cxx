@@ -630,7 +630,7 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
             {
               sum += d[m][i];
             }
-            tile.redo[i] = !(sum == sum);
+            tile.redo[i] = !(sum == sum); // NaN; NOLINT(misc-redundant-expression)
             for (int m = 0; tile.redo[i] && m < 9; ++m)
             {
               d[m][i] = 0;
@@ -639,7 +639,7 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
           for (int i = 0; i < nx; ++i)
           {
             const Real own = tile.plane(k)[(j - tile.jr0) * tile.pitch + i];
-            if (!(own == own))
+            if (!(own == own)) // NaN; NOLINT(misc-redundant-expression)
             {
               ++missing;
             }
@@ -741,7 +741,7 @@ void LevelSetCurvature::fitAround(
            tx < std::min(2 * ax.radius + 1, dims[0] + ax.radius - i); ++tx)
       {
         const Real value = row[i + tx - ax.radius];
-        if (value == value)
+        if (value == value) // no NaN; NOLINT(misc-redundant-expression)
         {
           const double u = (tx - ax.radius) / width[0];
           const double weight = ax.weight[tx];
