@@ -4,6 +4,7 @@
 
 #include "vtkCurvatureOpacityFunction.h"
 #include "vtkLightTransportArrays.h"
+#include "vtkLightTransportImage.h"
 #include "vtkLightTransportInternal.h"
 
 #include "vtkDataSet.h"
@@ -27,20 +28,6 @@
 
 vtkStandardNewMacro(vtkCurvatureOpacityFilter);
 vtkCxxSetObjectMacro(vtkCurvatureOpacityFilter, OpacityFunction, vtkCurvatureOpacityFunction);
-
-namespace
-{
-void AddFieldValues(vtkDataSet* data, const char* name, std::initializer_list<double> values)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  for (double value : values)
-  {
-    array->InsertNextValue(value);
-  }
-  data->GetFieldData()->AddArray(array);
-}
-} // namespace
 
 //------------------------------------------------------------------------------
 vtkCurvatureOpacityFilter::vtkCurvatureOpacityFilter()
@@ -259,8 +246,8 @@ std::string vtkCurvatureOpacityFilter::Compute(
     }
     output->GetPointData()->SetScalars(colors);
   }
-  AddFieldValues(output, "CurvatureOpacity.CurvatureScale", { s });
-  AddFieldValues(output, "CurvatureOpacity.DepthRange", { q0, q1 });
+  vtkLightTransportImage::AddFieldValues(output, "CurvatureOpacity.CurvatureScale", { s });
+  vtkLightTransportImage::AddFieldValues(output, "CurvatureOpacity.DepthRange", { q0, q1 });
   return {};
 }
 

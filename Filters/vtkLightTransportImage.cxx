@@ -8,10 +8,12 @@
 #include "vtkArrayDispatch.h"
 #include "vtkDataSetAttributes.h"
 #include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix3x3.h"
+#include "vtkNew.h"
 #include "vtkSmartPointer.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkUnsignedCharArray.h"
@@ -148,6 +150,33 @@ std::string Problem(vtkImageData* image)
 }
 
 //------------------------------------------------------------------------------
+std::string ScalarsProblem(
+  vtkAlgorithm* algorithm, vtkImageData* image, vtkDataArray* scalars, int component)
+{
+  std::ostringstream text;
+  if (!scalars)
+  {
+    const char* name = algorithm->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
+    text << "the image has no point array "
+         << (name ? std::string("\"") + name + "\"" : "of scalars")
+         << ", expected active point scalars or one named by SetInputArrayToProcess";
+    return text.str();
+  }
+  const std::string name = scalars->GetName() ? scalars->GetName() : "scalars";
+  if (scalars->GetNumberOfTuples() != image->GetNumberOfPoints())
+  {
+    text << "the array \"" << name << "\" has " << scalars->GetNumberOfTuples()
+         << " tuples, expected one for each of the " << image->GetNumberOfPoints() << " points";
+  }
+  else if (component < 0 || component >= scalars->GetNumberOfComponents())
+  {
+    text << "Component is " << component << ", expected 0 to "
+         << scalars->GetNumberOfComponents() - 1 << " for the array \"" << name << "\"";
+  }
+  return text.str();
+}
+
+//------------------------------------------------------------------------------
 lighttransport::Grid GridOf(vtkImageData* image)
 {
   lighttransport::Grid grid;
@@ -279,6 +308,18 @@ void RequestWholeExtents(vtkInformationVector** inputs, int numberOfPorts)
       }
     }
   }
+}
+
+//------------------------------------------------------------------------------
+void AddFieldValues(vtkDataObject* data, const char* name, std::initializer_list<double> values)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  for (const double value : values)
+  {
+    array->InsertNextValue(value);
+  }
+  data->GetFieldData()->AddArray(array);
 }
 
 //------------------------------------------------------------------------------

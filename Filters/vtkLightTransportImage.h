@@ -10,11 +10,13 @@
 #include "Core/Grid.h"
 #include "Core/Parallel.h"
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
 class vtkAlgorithm;
 class vtkDataArray;
+class vtkDataObject;
 class vtkImageData;
 class vtkInformationVector;
 
@@ -26,6 +28,13 @@ namespace vtkLightTransportImage
  * that are orthonormal to 1e-3.
  */
 std::string Problem(vtkImageData* image);
+
+/**
+ * What is wrong with the point array that an algorithm reads one component of, or nothing: is it
+ * there (null if not), has it a tuple per point and that component?
+ */
+std::string ScalarsProblem(
+  vtkAlgorithm* algorithm, vtkImageData* image, vtkDataArray* scalars, int component);
 
 /** The image's points as voxels. */
 lighttransport::Grid GridOf(vtkImageData* image);
@@ -55,6 +64,9 @@ lighttransport::ValueReader Reader(vtkDataArray* array, int component,
 
 /** Asks the whole extent of every connection of every image port. */
 void RequestWholeExtents(vtkInformationVector** inputs, int numberOfPorts);
+
+/** Adds the values as an array of the field data, so that a saved file says how it was made. */
+void AddFieldValues(vtkDataObject* data, const char* name, std::initializer_list<double> values);
 
 /** Reports the algorithm's progress between two fractions; false once it is to abort. */
 lighttransport::ProgressFunction Progress(vtkAlgorithm* algorithm, double from, double to);

@@ -90,13 +90,6 @@ lighttransport::ValueReader Composed(vtkPiecewiseFunction* function,
   };
 }
 
-void AddFieldValue(vtkImageData* image, const char* name, double value)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->InsertNextValue(value);
-  image->GetFieldData()->AddArray(array);
-}
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -288,27 +281,12 @@ std::string vtkOpticalMediumFilter::Compute(
   }
   std::ostringstream text;
   const vtkIdType size = input->GetNumberOfPoints();
-  if (!scalars)
+  problem = image::ScalarsProblem(this, input, scalars, this->Component);
+  if (!problem.empty())
   {
-    const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
-    text << "the image has no point array "
-         << (name ? std::string("\"") + name + "\"" : "of scalars")
-         << ", expected active point scalars or one named by SetInputArrayToProcess";
-    return text.str();
+    return problem;
   }
   const std::string name = scalars->GetName() ? scalars->GetName() : "scalars";
-  if (scalars->GetNumberOfTuples() != size)
-  {
-    text << "the array \"" << name << "\" has " << scalars->GetNumberOfTuples()
-         << " tuples, expected one for each of the " << size << " points";
-    return text.str();
-  }
-  if (this->Component < 0 || this->Component >= scalars->GetNumberOfComponents())
-  {
-    text << "Component is " << this->Component << ", expected 0 to "
-         << scalars->GetNumberOfComponents() - 1 << " for the array \"" << name << "\"";
-    return text.str();
-  }
 
   const Grid grid = image::GridOf(input);
   const double spacing = grid.smallestSpacing();
@@ -425,8 +403,10 @@ std::string vtkOpticalMediumFilter::Compute(
   output->ShallowCopy(input);
   output->GetPointData()->AddArray(D);
   output->GetPointData()->AddArray(sigma_a);
-  AddFieldValue(output, "OpticalMedium.GradientScale", report.gradientScale);
-  AddFieldValue(output, "OpticalMedium.DiffusionLength", parameters.ell);
+  vtkLightTransportImage::AddFieldValues(
+    output, "OpticalMedium.GradientScale", { report.gradientScale });
+  vtkLightTransportImage::AddFieldValues(
+    output, "OpticalMedium.DiffusionLength", { parameters.ell });
   return {};
 }
 

@@ -831,36 +831,19 @@ std::string vtkVisibilityFactorFilter::ComputeExtinction(
   vtkDataArray* scalars = classify
     ? this->GetInputArrayToProcess(0, inputs)
     : input->GetPointData()->GetArray(this->ExtinctionArrayName.c_str());
-  const vtkIdType points = input->GetNumberOfPoints();
-  if (!scalars)
+  if (!scalars && !classify)
   {
-    const char* named = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
-    if (classify)
-    {
-      text << "the image has no point array "
-           << (named ? std::string("\"") + named + "\"" : "of scalars")
-           << ", expected active point scalars or one named by SetInputArrayToProcess";
-    }
-    else
-    {
-      text << "neither ScalarOpacity nor TransferFunction2D is set and the image has no point "
-           << "array \"" << this->ExtinctionArrayName << "\", expected one of the three";
-    }
+    text << "neither ScalarOpacity nor TransferFunction2D is set and the image has no point "
+         << "array \"" << this->ExtinctionArrayName << "\", expected one of the three";
     return text.str();
+  }
+  std::string wrong =
+    vtkLightTransportImage::ScalarsProblem(this, input, scalars, classify ? this->Component : 0);
+  if (!wrong.empty())
+  {
+    return wrong;
   }
   const std::string name = scalars->GetName() ? scalars->GetName() : "scalars";
-  if (scalars->GetNumberOfTuples() != points)
-  {
-    text << "the array \"" << name << "\" has " << scalars->GetNumberOfTuples()
-         << " tuples, expected one for each of the " << points << " points";
-    return text.str();
-  }
-  if (classify && (this->Component < 0 || this->Component >= scalars->GetNumberOfComponents()))
-  {
-    text << "Component is " << this->Component << ", expected 0 to "
-         << scalars->GetNumberOfComponents() - 1 << " for the array \"" << name << "\"";
-    return text.str();
-  }
   const int channels = this->RGBExtinction ? 3 : 1;
   if (!classify && scalars->GetNumberOfComponents() != channels)
   {

@@ -34,13 +34,6 @@ constexpr double SmallestSpacing = 1e-15; // curvatures, and their product, in f
 constexpr double LargestSpacing = 1e15;
 constexpr double QuantisationNoise = 0.29; // of whole numbers, 1/sqrt(12)
 
-void AddFieldValue(vtkImageData* image, const char* name, double value)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->InsertNextValue(value);
-  image->GetFieldData()->AddArray(array);
-}
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -125,27 +118,12 @@ std::string vtkVolumeCurvatureFilter::Compute(
   }
   std::ostringstream text;
   const vtkIdType size = input->GetNumberOfPoints();
-  if (!scalars)
+  problem = image::ScalarsProblem(this, input, scalars, this->Component);
+  if (!problem.empty())
   {
-    const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
-    text << "the image has no point array "
-         << (name ? std::string("\"") + name + "\"" : "of scalars")
-         << ", expected active point scalars or one named by SetInputArrayToProcess";
-    return text.str();
+    return problem;
   }
   const std::string name = scalars->GetName() ? scalars->GetName() : "scalars";
-  if (scalars->GetNumberOfTuples() != size)
-  {
-    text << "the array \"" << name << "\" has " << scalars->GetNumberOfTuples()
-         << " tuples, expected one for each of the " << size << " points";
-    return text.str();
-  }
-  if (this->Component < 0 || this->Component >= scalars->GetNumberOfComponents())
-  {
-    text << "Component is " << this->Component << ", expected 0 to "
-         << scalars->GetNumberOfComponents() - 1 << " for the array \"" << name << "\"";
-    return text.str();
-  }
   const Grid grid = image::GridOf(input);
   const double spacing = grid.smallestSpacing();
   if (!(spacing >= SmallestSpacing && spacing <= LargestSpacing))
@@ -242,9 +220,11 @@ std::string vtkVolumeCurvatureFilter::Compute(
       output->GetPointData()->AddArray(arrays[a]);
     }
   }
-  AddFieldValue(output, "VolumeCurvature.DerivativeScale", sigma);
-  AddFieldValue(output, "VolumeCurvature.NoiseLevel", parameters.noise);
-  AddFieldValue(output, "VolumeCurvature.GradientThreshold", report.threshold);
+  vtkLightTransportImage::AddFieldValues(output, "VolumeCurvature.DerivativeScale", { sigma });
+  vtkLightTransportImage::AddFieldValues(
+    output, "VolumeCurvature.NoiseLevel", { parameters.noise });
+  vtkLightTransportImage::AddFieldValues(
+    output, "VolumeCurvature.GradientThreshold", { report.threshold });
   return {};
 }
 

@@ -25,6 +25,27 @@ enum class Pages
 };
 
 /**
+ * Asks for large pages where the system has them: the first touch then costs a tenth, and what is
+ * touched is rounded up to 2 MiB.
+ */
+inline void PreferLargePages(void* memory, std::size_t bytes)
+{
+#if defined(MADV_HUGEPAGE)
+  constexpr std::uintptr_t page = std::uintptr_t(1) << 21;
+  const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(memory);
+  const std::uintptr_t from = (begin + page - 1) / page * page;
+  const std::uintptr_t to = (begin + bytes) / page * page;
+  if (from < to)
+  {
+    madvise(reinterpret_cast<void*>(from), to - from, MADV_HUGEPAGE); // a wish
+  }
+#else
+  (void)memory;
+  (void)bytes;
+#endif
+}
+
+/**
  * Zeroed memory for one value per voxel, with a line of zeros on either side,
  * so that the kernels may read the neighbours of the first and last value.
  * Untouched pages cost nothing until they are written. Throws std::bad_alloc.
@@ -55,20 +76,10 @@ public:
     {
       throw std::bad_alloc();
     }
-#if defined(__linux__) && defined(MADV_HUGEPAGE)
-    // In large pages the first touch costs a tenth, and rounds what is touched up to 2 MiB.
     if (pages == Pages::Large && bytes >= (std::size_t(1) << 22))
     {
-      constexpr std::uintptr_t page = std::uintptr_t(1) << 21;
-      const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(this->memory.get());
-      const std::uintptr_t from = (begin + page - 1) / page * page;
-      const std::uintptr_t to = (begin + bytes) / page * page;
-      if (from < to)
-      {
-        madvise(reinterpret_cast<void*>(from), to - from, MADV_HUGEPAGE); // a wish
-      }
+      PreferLargePages(this->memory.get(), bytes);
     }
-#endif
     const std::uintptr_t start = reinterpret_cast<std::uintptr_t>(this->memory.get());
     this->first = reinterpret_cast<T*>((start + Line - 1) / Line * Line + shift) + Pad;
     this->count = size;
@@ -80,34 +91,13 @@ public:
     this->count = 0;
   }
 
-  T* data()
-  {
-    return this->first;
-  }
-  const T* data() const
-  {
-    return this->first;
-  }
-  T& operator[](std::int64_t i)
-  {
-    return this->data()[i];
-  }
-  const T& operator[](std::int64_t i) const
-  {
-    return this->data()[i];
-  }
-  std::int64_t size() const
-  {
-    return this->count;
-  }
-  bool empty() const
-  {
-    return this->count == 0;
-  }
-  std::int64_t bytes() const
-  {
-    return this->count * static_cast<std::int64_t>(sizeof(T));
-  }
+  T* data() { return this->first; }
+  const T* data() const { return this->first; }
+  T& operator[](std::int64_t i) { return this->data()[i]; }
+  const T& operator[](std::int64_t i) const { return this->data()[i]; }
+  std::int64_t size() const { return this->count; }
+  bool empty() const { return this->count == 0; }
+  std::int64_t bytes() const { return this->count * static_cast<std::int64_t>(sizeof(T)); }
 
 private:
   static constexpr std::size_t Line = 64;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Curvature.h"
 
+#include "Core/Cholesky.h"
 #include "Core/Kernel.h"
 
 #include <algorithm>
@@ -276,38 +277,6 @@ PASSES(double)
 #undef PASSES
 
 //------------------------------------------------------------------------------
-/** Solves the symmetric positive definite A x = b, n <= 10; A's lower half is used up. */
-void solve(int n, double A[10][10], double b[10])
-{
-  for (int j = 0; j < n; ++j)
-  {
-    for (int i = j; i < n; ++i)
-    {
-      double sum = A[i][j];
-      for (int k = 0; k < j; ++k)
-      {
-        sum -= A[i][k] * A[j][k];
-      }
-      A[i][j] = i == j ? std::sqrt(std::max(sum, 1e-30)) : sum / A[j][j];
-    }
-  }
-  for (int i = 0; i < n; ++i)
-  {
-    for (int k = 0; k < i; ++k)
-    {
-      b[i] -= A[i][k] * b[k];
-    }
-    b[i] /= A[i][i];
-  }
-  for (int i = n - 1; i >= 0; --i)
-  {
-    for (int k = i + 1; k < n; ++k)
-    {
-      b[i] -= A[k][i] * b[k];
-    }
-    b[i] /= A[i][i];
-  }
-}
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -788,7 +757,7 @@ void LevelSetCurvature::fitAround(
     A[m][m] += m > 0 ? Ridge * moments[0][0][0] : 0.;
     b[m] = values[powers[m][0]][powers[m][1]][powers[m][2]];
   }
-  solve(10, A, b);
+  SolvePositive(10, A, b);
   for (int m = 1; m < 10; ++m)
   {
     double factor = 1.;

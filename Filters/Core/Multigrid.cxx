@@ -130,6 +130,25 @@ void residualRow(int n, const RowFaces& f, const RowView& v, const float* LIGHTT
   }
 }
 
+LIGHTTRANSPORT_SIMD
+double dotRow(int n, const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b)
+{
+  double dot[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  int i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      dot[l] += static_cast<double>(a[i + l]) * static_cast<double>(b[i + l]);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    dot[0] += static_cast<double>(a[i]) * static_cast<double>(b[i]);
+  }
+  return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
+}
+
 /** y = A x; returns x . y */
 LIGHTTRANSPORT_SIMD
 double applyRow(int n, const RowFaces& f, const RowView& v, float* LIGHTTRANSPORT_RESTRICT y)
@@ -151,39 +170,7 @@ double applyRow(int n, const RowFaces& f, const RowView& v, float* LIGHTTRANSPOR
     y[i] = gx[i] * (c - x[i + 1]) + gx[i - 1] * (c - x[i - 1]) + gy[i] * (c - xN[i]) +
       gyS[i] * (c - xS[i]) + gz[i] * (c - xT[i]) + gzB[i] * (c - xB[i]) + s[i] * c;
   }
-  double dot[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
-  int i = 0;
-  for (; i + 8 <= n; i += 8)
-  {
-    for (int l = 0; l < 8; ++l)
-    {
-      dot[l] += static_cast<double>(x[i + l]) * static_cast<double>(y[i + l]);
-    }
-  }
-  for (; i < n; ++i)
-  {
-    dot[0] += static_cast<double>(x[i]) * static_cast<double>(y[i]);
-  }
-  return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
-}
-
-LIGHTTRANSPORT_SIMD
-double dotRow(int n, const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b)
-{
-  double dot[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
-  int i = 0;
-  for (; i + 8 <= n; i += 8)
-  {
-    for (int l = 0; l < 8; ++l)
-    {
-      dot[l] += static_cast<double>(a[i + l]) * static_cast<double>(b[i + l]);
-    }
-  }
-  for (; i < n; ++i)
-  {
-    dot[0] += static_cast<double>(a[i]) * static_cast<double>(b[i]);
-  }
-  return ((dot[0] + dot[4]) + (dot[1] + dot[5])) + ((dot[2] + dot[6]) + (dot[3] + dot[7]));
+  return dotRow(n, x, y);
 }
 
 /** p = z + beta p, y = A z + beta y; returns p . y */

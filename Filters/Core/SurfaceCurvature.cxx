@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/SurfaceCurvature.h"
 
+#include "Core/Cholesky.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -50,39 +52,6 @@ void Normalize(Vector& v)
     {
       x /= length;
     }
-  }
-}
-
-/** Cholesky without pivots: A positive definite, of n <= 10 rows, its lower half used up. */
-void Solve(int n, double A[10][10], double b[10])
-{
-  for (int j = 0; j < n; ++j)
-  {
-    for (int i = j; i < n; ++i)
-    {
-      double sum = A[i][j];
-      for (int k = 0; k < j; ++k)
-      {
-        sum -= A[i][k] * A[j][k];
-      }
-      A[i][j] = i == j ? std::sqrt(std::max(sum, 1e-30)) : sum / A[j][j];
-    }
-  }
-  for (int i = 0; i < n; ++i)
-  {
-    for (int k = 0; k < i; ++k)
-    {
-      b[i] -= A[i][k] * b[k];
-    }
-    b[i] /= A[i][i];
-  }
-  for (int i = n - 1; i >= 0; --i)
-  {
-    for (int k = i + 1; k < n; ++k)
-    {
-      b[i] -= A[k][i] * b[k];
-    }
-    b[i] /= A[i][i];
   }
 }
 
@@ -302,7 +271,7 @@ void Fit(
   {
     A[i][i] += (i < 6 ? Ridge : CubicRidge) * total;
   }
-  Solve(terms, A, b);
+  SolvePositive(terms, A, b);
   const double w2 = 1. + b[1] * b[1] + b[2] * b[2];
   mean = -((1. + b[2] * b[2]) * b[3] - 2. * b[1] * b[2] * b[4] + (1. + b[1] * b[1]) * b[5]) /
     (2. * w2 * std::sqrt(w2)) / size;

@@ -14,6 +14,7 @@
  * quality is that of the medium alone there (no gradient is a surface), which is
  * what those rays compute. The exit code is 0 whatever the times are.
  */
+#include "BenchVolume.h"
 #include "LightTransportRenderingTesting.h"
 
 #include "vtkCamera.h"
@@ -39,26 +40,6 @@ using namespace lighttransport::testing;
 
 namespace
 {
-/** bench-frame's ball: soft, with waves in it, on [-1,1]^3; grey 0..255. */
-vtkSmartPointer<vtkImageData> makeVolume(int n)
-{
-  auto image = vtkSmartPointer<vtkImageData>::New();
-  image->SetDimensions(n, n, n);
-  image->SetOrigin(-1., -1., -1.);
-  image->SetSpacing(2. / (n - 1), 2. / (n - 1), 2. / (n - 1));
-  image->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
-  auto* grey = static_cast<unsigned char*>(image->GetScalarPointer());
-  for (vtkIdType i = 0; i < image->GetNumberOfPoints(); ++i)
-  {
-    double p[3];
-    image->GetPoint(i, p);
-    const double r = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-    grey[i] = static_cast<unsigned char>(
-      r > .9 ? 0. : 120. + 100. * std::sin(12. * p[0]) * std::sin(9. * p[1]) * r);
-  }
-  return image;
-}
-
 struct View
 {
   vtkNew<vtkRenderWindow> window;

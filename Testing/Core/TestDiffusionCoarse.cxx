@@ -20,25 +20,6 @@ std::size_t index(const DiffusionScene& scene, int i, int j, int k)
   return static_cast<std::size_t>(scene.grid.index(i, j, k));
 }
 
-double percentile(const std::vector<double>& phi, const std::vector<double>& exact)
-{
-  double largest = 0.;
-  for (const double v : exact)
-  {
-    largest = std::max(largest, std::abs(v));
-  }
-  std::vector<double> errors;
-  for (std::size_t i = 0; i < phi.size(); ++i)
-  {
-    if (std::abs(exact[i]) >= 1e-6 * largest)
-    {
-      errors.push_back(std::abs(phi[i] - exact[i]) / std::abs(exact[i]));
-    }
-  }
-  std::sort(errors.begin(), errors.end());
-  return errors[errors.size() * 95 / 100];
-}
-
 DiffusionScene blobs(std::array<int, 3> dims, std::array<double, 3> spacing, double sigma)
 {
   DiffusionScene scene(dims, spacing);
@@ -72,7 +53,7 @@ void identity(Suite& suite)
     DiffusionScene full = scene;
     full.solve(1e-12);
     LT_CHECK(suite, solve(scene, 1).reason == StopReason::Converged);
-    LT_CHECK_NEAR(suite, percentile(scene.phi, full.phi), 0., 1e-5);
+    LT_CHECK_NEAR(suite, lighttransport::testing::Percentile95(scene.phi, full.phi), 0., 1e-5);
   }
 }
 
@@ -122,8 +103,8 @@ void accuracy(Suite& suite)
     full.solve(1e-11);
     const DiffusionReport report = solve(two, 2);
     const DiffusionReport rough = solve(four, 4);
-    const double error2 = percentile(two.phi, full.phi);
-    const double error4 = percentile(four.phi, full.phi);
+    const double error2 = lighttransport::testing::Percentile95(two.phi, full.phi);
+    const double error4 = lighttransport::testing::Percentile95(four.phi, full.phi);
     std::cout << "sigma_a " << sigma << ": errors " << error2 << " (estimated "
               << report.estimatedError << "), " << error4 << " (" << rough.estimatedError << ")\n";
     LT_CHECK(suite, error2 < 0.01 && error4 < 0.4 && error2 < error4);
@@ -152,7 +133,7 @@ void accuracy(Suite& suite)
     // nor does the number of threads matter
     DiffusionScene threads = full;
     solve(threads, 2, {}, lighttransport::testing::ThreadedFor(3));
-    LT_CHECK_NEAR(suite, percentile(threads.phi, two.phi), 0., 1e-6);
+    LT_CHECK_NEAR(suite, lighttransport::testing::Percentile95(threads.phi, two.phi), 0., 1e-6);
   }
 }
 
@@ -178,7 +159,7 @@ void named(Suite& suite)
       DiffusionControl control;
       control.targetError = target;
       const DiffusionReport report = coarse.solve(scene.q.data(), scene.phi.data(), control);
-      const double error = percentile(scene.phi, full.phi);
+      const double error = lighttransport::testing::Percentile95(scene.phi, full.phi);
       std::cout << "kind " << kind << ", target " << target << ": error " << error << ", estimated "
                 << report.estimatedError << "\n";
       LT_CHECK(suite, report.reason == StopReason::Converged && error <= target);
@@ -193,7 +174,7 @@ void named(Suite& suite)
     control.targetError = .01;
     const DiffusionReport report = coarse.solve(scene.q.data(), scene.phi.data(), control, true);
     LT_CHECK(suite, report.reason == StopReason::Converged);
-    LT_CHECK(suite, percentile(scene.phi, full.phi) <= .01);
+    LT_CHECK(suite, lighttransport::testing::Percentile95(scene.phi, full.phi) <= .01);
     control.targetError = 0.;
     control.timeBudget = 1e-9;
     const DiffusionReport hasty = coarse.solve(scene.q.data(), scene.phi.data(), control);
@@ -219,7 +200,7 @@ void hardCases(Suite& suite)
       DiffusionControl control;
       control.targetError = .01;
       const DiffusionReport report = solve(scene, factor, control);
-      const double error = percentile(scene.phi, full.phi);
+      const double error = lighttransport::testing::Percentile95(scene.phi, full.phi);
       LT_CHECK(suite,
         error <= .01 || (report.reason == StopReason::MaxIterations && std::isfinite(error)));
     }
@@ -277,7 +258,7 @@ void hardCases(Suite& suite)
     DiffusionControl one;
     one.targetError = .01;
     LT_CHECK(suite, solve(extreme, 2, one).reason == StopReason::Converged);
-    LT_CHECK(suite, percentile(extreme.phi, full.phi) <= .01);
+    LT_CHECK(suite, lighttransport::testing::Percentile95(extreme.phi, full.phi) <= .01);
   }
 }
 } // namespace

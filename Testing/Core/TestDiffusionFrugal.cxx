@@ -20,26 +20,6 @@ std::size_t index(const DiffusionScene& scene, int i, int j, int k)
   return static_cast<std::size_t>(scene.grid.index(i, j, k));
 }
 
-/** 95th percentile of |phi - exact| / |exact| within six decades of the largest. */
-double percentile(const std::vector<double>& phi, const std::vector<double>& exact)
-{
-  double largest = 0.;
-  for (const double v : exact)
-  {
-    largest = std::max(largest, std::abs(v));
-  }
-  std::vector<double> errors;
-  for (std::size_t i = 0; i < phi.size(); ++i)
-  {
-    if (std::abs(exact[i]) >= 1e-6 * largest)
-    {
-      errors.push_back(std::abs(phi[i] - exact[i]) / std::abs(exact[i]));
-    }
-  }
-  std::sort(errors.begin(), errors.end());
-  return errors[errors.size() * 95 / 100];
-}
-
 /** A bent tube in absorbing tissue. */
 DiffusionScene tube(int n, double wall, double radius = 2.5)
 {
@@ -78,7 +58,7 @@ void activeRegion(Suite& suite)
     control.tolerance = 1e-9;
     const DiffusionReport report =
       solver.solveActive(active.medium(), active.q.data(), active.phi.data(), control, 1e-7);
-    const double error = percentile(active.phi, full.phi);
+    const double error = lighttransport::testing::Percentile95(active.phi, full.phi);
     std::cout << "tube: " << report.activeFraction << " of the voxels, " << report.fineApplications
               << " instead of " << whole.fineApplications << " full applications, error " << error
               << ", leaked " << report.leaked << "\n";
@@ -110,7 +90,7 @@ void activeRegion(Suite& suite)
     std::cout << "wide tube: " << ToString(report.reason) << ", " << report.iterations
               << " iterations\n";
     LT_CHECK(suite, report.reason == StopReason::Converged);
-    LT_CHECK(suite, percentile(active.phi, full.phi) < 1e-2);
+    LT_CHECK(suite, lighttransport::testing::Percentile95(active.phi, full.phi) < 1e-2);
   }
   {
     // light that fills the volume: the full solve, and little lost on the way there
@@ -127,7 +107,7 @@ void activeRegion(Suite& suite)
               << "\n";
     LT_CHECK(suite, report.reason == StopReason::Converged && report.activeFraction == 1.);
     LT_CHECK(suite, report.fineApplications < 1.2 * whole.fineApplications);
-    LT_CHECK_NEAR(suite, percentile(active.phi, full.phi), 0., 1e-4);
+    LT_CHECK_NEAR(suite, lighttransport::testing::Percentile95(active.phi, full.phi), 0., 1e-4);
   }
   {
     // nowhere to go, no light, bad input: as the full solve
@@ -178,7 +158,7 @@ void targetError(Suite& suite)
       control.targetError = target;
       scene.phi.assign(scene.phi.size(), 0.);
       const DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
-      const double error = percentile(scene.phi, exact.phi);
+      const double error = lighttransport::testing::Percentile95(scene.phi, exact.phi);
       std::cout << "kind " << kind << ", target " << target << ": " << report.iterations
                 << " iterations, error " << error << ", estimated " << report.estimatedError
                 << "\n";

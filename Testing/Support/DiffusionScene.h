@@ -9,6 +9,7 @@
 
 #include "Core/Diffusion.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -145,6 +146,26 @@ struct DiffusionScene
     return e;
   }
 };
+/** 95th percentile of |phi - exact| / |exact| within six decades of the largest. */
+inline double Percentile95(const std::vector<double>& phi, const std::vector<double>& exact)
+{
+  double largest = 0.;
+  for (const double v : exact)
+  {
+    largest = std::max(largest, std::abs(v));
+  }
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < phi.size(); ++i)
+  {
+    if (std::abs(exact[i]) >= 1e-6 * largest)
+    {
+      errors.push_back(std::abs(phi[i] - exact[i]) / std::abs(exact[i]));
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors[errors.size() * 95 / 100];
+}
+
 } // namespace testing
 } // namespace lighttransport
 
