@@ -3,6 +3,7 @@
 /** Only what the scene requires: active regions, named errors, budgets, cancelling. */
 #include "DiffusionScene.h"
 #include "LightTransportTesting.h"
+#include "ThreadedFor.h"
 
 #include <algorithm>
 #include <chrono>
@@ -193,12 +194,53 @@ void budget(Suite& suite)
   report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
   LT_CHECK(suite, shown >= report.iterations - 1 && shown > 2);
 }
+
+/** Whatever the threads: the same field of a region, the same estimate, the same stop. */
+void threads(Suite& suite)
+{
+  const DiffusionScene scene = tube(64, 1e-4);
+  const auto solve = [&](const ParallelFor& parallelFor, bool active, std::vector<double>& phi)
+  {
+    phi = scene.phi;
+    DiffusionSolver solver(parallelFor);
+    DiffusionControl control;
+    control.progress = [](double) { return true; };
+    if (active)
+    {
+      return solver.solveActive(scene.medium(), scene.q.data(), phi.data(), control, 1e-3);
+    }
+    solver.setMedium(scene.medium());
+    control.targetError = 0.03;
+    return solver.solveSteady(scene.q.data(), phi.data(), control);
+  };
+  for (const bool active : { true, false })
+  {
+    std::vector<double> together;
+    const DiffusionReport three = solve(lighttransport::testing::ThreadedFor(3), active, together);
+    std::cout << "threads: " << three.activeFraction << " of the voxels\n";
+    LT_CHECK(suite, three.reason == StopReason::Converged);
+    LT_CHECK(suite, (three.activeFraction < 1.) == active);
+    LT_CHECK(suite, three.activeFraction * 262144. > 32768.); // worth a thread
+    if (!lighttransport::testing::LookingForRaces)
+    {
+      std::vector<double> alone;
+      const DiffusionReport one = solve(SerialFor, active, alone);
+      LT_CHECK(suite, three.estimatedError == one.estimatedError);
+      LT_CHECK(suite, together == alone);
+    }
+  }
+}
 } // namespace
 
 int main(int argc, char* argv[])
 {
   Suite suite(argc, argv);
   Suite::trapFloatingPoint();
+  threads(suite);
+  if (lighttransport::testing::LookingForRaces)
+  {
+    return suite.result();
+  }
   activeRegion(suite);
   targetError(suite);
   budget(suite);

@@ -25,6 +25,16 @@ namespace lighttransport
 {
 namespace testing
 {
+/**
+ * Whether this is a build that looks for races, which takes twenty times as long: what runs in
+ * one thread, and is the same in the other builds, may then be left out.
+ */
+#if defined(__SANITIZE_THREAD__)
+constexpr bool LookingForRaces = true;
+#else
+constexpr bool LookingForRaces = false;
+#endif
+
 class Suite
 {
 public:
