@@ -23,13 +23,14 @@
  *    points hidden by vtkGhostType are left out of all fits; their curvature is 0.
  *    They change nothing beyond the kernel's reach, and beside them the fit takes
  *    what there is: a wall has no curvature of its own.
- * 2. Gradient g and Hessian H of a quadratic function fitted around the point with
- *    Gaussian weights of standard deviation DerivativeScale, in world lengths:
- *    exact for quadratic functions in any spacing, borders included.
+ * 2. Gradient g and Hessian H of polynomials fitted around the point with Gaussian
+ *    weights of standard deviation DerivativeScale, in world lengths: exact for
+ *    quadratic functions in any spacing, borders included.
  * 3. G = -P H P / |g| with P = I - n n^T (Kindlmann, Whitaker, Tasdizen, Moeller:
  *    Curvature-based transfer functions for direct volume rendering, IEEE
  *    Visualization 2003), whose eigenvalues on the tangent plane are k1 and k2.
- *    Second order in the spacing; within a kernel of the border first order.
+ *    Second order in the spacing, also beside borders and what is missing, where the
+ *    error is about ten times that of the interior.
  * 4. Where |g| is no more than what noise makes of it there is no level set: see
  *    NoiseLevel. Flat and constant regions have curvature 0.
  *

@@ -9,8 +9,9 @@
 
 namespace lighttransport
 {
-/** Cholesky: b becomes x of A x = b; A is positive definite, n <= 10, its lower half used up. */
-inline void SolvePositive(int n, double A[10][10], double b[10])
+/** Cholesky: b becomes x of A x = b; A is positive definite, n <= N, its lower half used up. */
+template <int N>
+inline void SolvePositive(int n, double (&A)[N][N], double (&b)[N])
 {
   for (int j = 0; j < n; ++j)
   {

@@ -26,11 +26,14 @@ namespace lighttransport
 namespace
 {
 constexpr double SmallestSigma = 0.4;    // voxels: well conditioned with three points
+constexpr double SmallestFit = 1.;       // and beside holes with four on one side
 constexpr double FlatBelow = 3.;         // times the gradient's noise; twice this shows in full
 constexpr double LargestCurvature = 2.;  // per smallest spacing
 constexpr double SmallestValue = 1e-300; // a smaller range cannot be scaled to 1
 constexpr double LargestNoise = 1e3;     // of the largest value: nothing is left
-constexpr double Ridge = 1e-7;           // of the fit around holes
+constexpr double Ridge = 1e-9;           // of the fit around holes
+constexpr double CubicRidge = 1e-6;      // and of its terms of third order
+constexpr double Cubic = 0.02;           // a term of third order, of the values' deviation
 constexpr int ProgressSteps = 16;
 constexpr std::int64_t MinimumTiles = 64; // enough for many threads
 constexpr int NumberOfNoiseSamples = 1 << 14;
@@ -159,19 +162,18 @@ ALWAYS_INLINE void alongX(int n, int taps, const Real* const* y, const Real* k0,
 template <class Real>
 struct Scale
 {
-  Real flat; ///< 3 noise_g, > 0
-  Real flat2;
   Real sign; ///< of the normal
   Real unit; ///< 1/h
 };
 
 /**
  * Rows of k1, k2, mean and Gaussian curvature and of what is 0 where there is no
- * surface, from rows of derivatives.
+ * surface, from rows of derivatives and of flat = 3 noise_g, > 0.
  */
 template <class Real>
-ALWAYS_INLINE void curvatures(int n, const Real* LIGHTTRANSPORT_RESTRICT d, std::int64_t pitch,
-  const Scale<Real>& scale, float* LIGHTTRANSPORT_RESTRICT out)
+ALWAYS_INLINE void curvatures(int n, const Real* LIGHTTRANSPORT_RESTRICT d,
+  const Real* LIGHTTRANSPORT_RESTRICT flats, std::int64_t pitch, const Scale<Real>& scale,
+  float* LIGHTTRANSPORT_RESTRICT out)
 {
   const Real* gx = d;
   const Real* gy = d + pitch;
@@ -187,8 +189,6 @@ ALWAYS_INLINE void curvatures(int n, const Real* LIGHTTRANSPORT_RESTRICT d, std:
   float* mean = out + 2 * pitch;
   float* gaussian = out + 3 * pitch;
   float* surface = out + 4 * pitch;
-  const Real flat = scale.flat;
-  const Real flat2 = scale.flat2;
   const Real unit = scale.unit;
   const Real sign = scale.sign;
   const Real one = 1;
@@ -199,6 +199,8 @@ ALWAYS_INLINE void curvatures(int n, const Real* LIGHTTRANSPORT_RESTRICT d, std:
   for (int i = 0; i < n; ++i)
   {
     const Real squared = gx[i] * gx[i] + gy[i] * gy[i] + gz[i] * gz[i];
+    const Real flat = flats[i];
+    const Real flat2 = flat * flat;
     // No selects, of which GCC 12 makes branches: max(a, b) = (a + b + |a - b|) / 2.
     const Real length = Sqrt(half * (squared + flat2 + Abs(squared - flat2)));
     const Real inverse = one / length;
@@ -267,10 +269,10 @@ ALWAYS_INLINE void curvatures(int n, const Real* LIGHTTRANSPORT_RESTRICT d, std:
     alongX<Real>(n, taps, y, k0, k1, k2, d);                                                       \
   }                                                                                                \
   LIGHTTRANSPORT_SIMD                                                                              \
-  void passCurvature(                                                                              \
-    int n, const Real* d, std::int64_t pitch, const Scale<Real>& scale, float* out)                \
+  void passCurvature(int n, const Real* d, const Real* flat, std::int64_t pitch,                   \
+    const Scale<Real>& scale, float* out)                                                          \
   {                                                                                                \
-    curvatures<Real>(n, d, pitch, scale, out);                                                     \
+    curvatures<Real>(n, d, flat, pitch, scale, out);                                               \
   }
 PASSES(float)
 PASSES(double)
@@ -290,85 +292,107 @@ LevelSetCurvature::LevelSetCurvature(const Grid& grid, double sigma)
     const int n = grid.dims[axisIndex];
     axis.unit = this->h / grid.spacing[axisIndex];
     const double s = std::min(std::max(sigma / grid.spacing[axisIndex], SmallestSigma), 1e3 * n);
-    axis.radius =
-      static_cast<int>(std::min<double>(std::max(2., std::ceil(3. * s)), std::max(n - 1, 0)));
-    const int r = axis.radius;
-    const int taps = 2 * r + 1;
-    axis.weight.resize(taps);
-    for (int t = 0; t < taps; ++t)
+    const int r =
+      static_cast<int>(std::min<double>(std::max(3., std::ceil(3. * s)), std::max(n - 1, 0)));
+    const int taps = std::min(2 * r + 1, n);
+    axis.size = n;
+    axis.radius = r;
+    axis.taps = taps;
+    axis.narrow = std::ceil(3. * s) < r;
+    for (std::vector<double>* kernel : { &axis.weight, &axis.smooth, &axis.slope, &axis.curve })
     {
-      const double x = (t - r) / s;
-      axis.weight[t] = std::exp(-0.5 * x * x);
+      kernel->assign(static_cast<std::size_t>(n) * taps, 0.);
     }
-    axis.smooth.assign(static_cast<std::size_t>(n) * taps, 0.);
-    axis.slope.assign(static_cast<std::size_t>(n) * taps, 0.);
-    axis.curve.assign(static_cast<std::size_t>(n) * taps, 0.);
     for (int i = 0; i < n; ++i)
     {
-      // Orthogonal polynomials 1, q1, q2 under the weights that lie inside.
-      const int first = std::max(0, r - i);
-      const int last = std::min(taps, n + r - i);
-      const auto sumOf = [&](const auto& f)
+      const int own = i - axis.start(i); // the tap of the position itself
+      const double wide = s * std::max(1., double(std::max(own, taps - 1 - own)) / std::max(r, 1));
+      const std::size_t row = static_cast<std::size_t>(i) * taps;
+      // Orthogonal polynomials under the weights, by their recurrence
+      // q_(m+1) = (u - a_m) q_m - b_m q_(m-1); with their derivatives at the position.
+      std::vector<double> u(taps);
+      std::vector<double> weight(taps, 0.);
+      std::vector<double> q(taps, 1.);
+      std::vector<double> before(taps, 0.);
+      for (int t = 0; t < taps; ++t)
       {
-        double sum = 0.;
-        for (int t = first; t < last; ++t)
+        u[t] = (t - own) / wide;
+        const double x = (t - own) / std::max(wide, SmallestFit);
+        axis.weight[row + t] = std::exp(-0.5 * x * x);
+      }
+      for (int t = axis.skip(i); t < taps - axis.skip(i); ++t)
+      {
+        weight[t] = std::exp(-0.5 * u[t] * u[t]);
+      }
+      const double perUnit = axis.unit / wide;
+      double at[3] = { 1., 0., 0. }; // q, q', q'' at the position
+      double atBefore[3] = { 0., 0., 0. };
+      double normBefore = 1.;
+      for (int degree = 0; degree <= 3 && degree < taps; ++degree)
+      {
+        double norm = 0.;
+        double first = 0.;
+        for (int t = 0; t < taps; ++t)
         {
-          sum += axis.weight[t] * f((t - r) / s);
+          const double w = weight[t] * q[t] * q[t];
+          norm += w;
+          first += w * u[t];
         }
-        return sum;
-      };
-      const double m0 = sumOf([](double) { return 1.; });
-      const double mean = sumOf([](double u) { return u; }) / m0;
-      const double m2 = sumOf([&](double u) { return (u - mean) * (u - mean); });
-      const double m3 = sumOf([&](double u) { return (u - mean) * (u - mean) * (u - mean); });
-      const bool linear = last - first >= 2;
-      const bool quadratic = last - first >= 3;
-      const double c = linear ? m3 / m2 : 0.;
-      const auto q2 = [&](double u) { return (u - mean) * (u - mean - c) - m2 / m0; };
-      const double norm2 = quadratic ? sumOf([&](double u) { return q2(u) * q2(u); }) : 1.;
-      const double perUnit = axis.unit / s;
-      for (int t = first; t < last; ++t)
-      {
-        const std::size_t at = static_cast<std::size_t>(i) * taps + t;
-        const double u = (t - r) / s;
-        const double w = axis.weight[t];
-        const double a1 = linear ? w * (u - mean) / m2 : 0.;
-        const double a2 = quadratic ? w * q2(u) / norm2 : 0.;
-        axis.smooth[at] = w / m0 - a1 * mean;
-        axis.slope[at] = (a1 - a2 * (2. * mean + c)) * perUnit;
-        axis.curve[at] = 2. * a2 * perUnit * perUnit;
+        for (int t = 0; t < taps; ++t)
+        {
+          const double part = weight[t] * q[t] / norm;
+          axis.smooth[row + t] += degree <= 1 ? part * at[0] : 0.;
+          axis.slope[row + t] += degree <= 2 ? part * at[1] * perUnit : 0.;
+          axis.curve[row + t] += part * at[2] * perUnit * perUnit;
+        }
+        const double a = first / norm;
+        const double b = degree > 0 ? norm / normBefore : 0.;
+        const double next[3] = { -a * at[0] - b * atBefore[0], at[0] - a * at[1] - b * atBefore[1],
+          2. * at[1] - a * at[2] - b * atBefore[2] };
+        for (int t = 0; t < taps; ++t)
+        {
+          const double value = (u[t] - a) * q[t] - b * before[t];
+          before[t] = q[t];
+          q[t] = value;
+        }
+        std::copy_n(at, 3, atBefore);
+        std::copy_n(next, 3, at);
+        normBefore = norm;
       }
       // Constants to the last digit, also where one-sided weights are ill-conditioned.
-      const std::size_t row = static_cast<std::size_t>(i) * taps;
       const auto total = [&](const std::vector<double>& kernel)
       { return std::accumulate(kernel.begin() + row, kernel.begin() + row + taps, 0.); };
-      axis.smooth[row + r] -= total(axis.smooth) - 1.;
-      axis.slope[row + r] -= total(axis.slope);
-      axis.curve[row + r] -= total(axis.curve);
+      axis.smooth[row + own] -= total(axis.smooth) - 1.;
+      axis.slope[row + own] -= total(axis.slope);
+      axis.curve[row + own] -= total(axis.curve);
     }
   }
 }
 
 //------------------------------------------------------------------------------
+std::array<double, 2> LevelSetCurvature::Axis::noise(int i) const
+{
+  std::array<double, 2> sums{ { 0., 0. } };
+  for (int t = 0; t < this->taps; ++t)
+  {
+    const std::size_t at = static_cast<std::size_t>(i) * this->taps + t;
+    sums[0] += this->smooth[at] * this->smooth[at];
+    sums[1] += this->slope[at] * this->slope[at];
+  }
+  return { { std::sqrt(sums[0]), std::sqrt(sums[1]) } };
+}
+
+//------------------------------------------------------------------------------
 double LevelSetCurvature::gradientNoise() const
 {
-  double smooth[3];
-  double slope[3];
+  std::array<double, 2> n[3];
   for (int a = 0; a < 3; ++a)
   {
-    const Axis& axis = this->axes[a];
-    const int taps = 2 * axis.radius + 1;
-    const std::size_t at = static_cast<std::size_t>(this->grid.dims[a] / 2) * taps;
-    smooth[a] = slope[a] = 0.;
-    for (int t = 0; t < taps; ++t)
-    {
-      smooth[a] += axis.smooth[at + t] * axis.smooth[at + t];
-      slope[a] += axis.slope[at + t] * axis.slope[at + t];
-    }
+    n[a] = this->axes[a].noise(this->grid.dims[a] / 2);
   }
-  const double largest = std::max({ slope[0] * smooth[1] * smooth[2],
-    smooth[0] * slope[1] * smooth[2], smooth[0] * smooth[1] * slope[2] });
-  return std::sqrt(largest) / this->h;
+  return std::max({ n[0][1] * n[1][0] * n[2][0], n[0][0] * n[1][1] * n[2][0],
+           n[0][0] * n[1][0] * n[2][1] }) /
+    this->h;
 }
 
 //------------------------------------------------------------------------------
@@ -382,13 +406,15 @@ struct LevelSetCurvature::Tile
   std::int64_t pitch = 0;
   std::int64_t planeSize = 0;
   std::vector<double> read;
-  std::vector<Real> values; ///< a ring of planes
-  std::vector<Real> z;      ///< 3 planes after the pass along z
-  std::vector<Real> y;      ///< 6 rows after the pass along y
-  std::vector<Real> d;      ///< 9 rows of derivatives
-  std::vector<float> k;     ///< 5 rows of curvatures
-  std::vector<char> hole;   ///< does a plane of the ring have holes
-  std::vector<char> redo;   ///< voxels of a row with holes within the kernel
+  std::vector<Real> values;      ///< a ring of planes
+  std::vector<Real> z;           ///< 3 planes after the pass along z
+  std::vector<Real> y;           ///< 6 rows after the pass along y
+  std::vector<Real> d;           ///< 9 rows of derivatives
+  std::vector<Real> flat;        ///< a row of the gradient's thresholds
+  std::array<double, 4> flatFor; ///< the noise of the other two axes behind it
+  std::vector<float> k;          ///< 5 rows of curvatures
+  std::vector<char> hole;        ///< does a plane of the ring have holes
+  std::vector<char> redo;        ///< voxels of a row with holes within the kernel
 
   Real* plane(int k) { return &this->values[(k % this->ring) * this->planeSize]; }
   const Real* plane(int k) const { return &this->values[(k % this->ring) * this->planeSize]; }
@@ -423,24 +449,25 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
   const double stored =
     std::min(std::max(parameters.noise, parameters.rounding) / unitValue, LargestNoise);
   const double noise = std::max(stored, 64. * std::numeric_limits<Real>::epsilon());
-  const double gradientNoise = noise * this->gradientNoise() * this->h;
-  const double flatBelow = std::max(FlatBelow * gradientNoise, 1e-15);
   Scale<Real> scale;
-  scale.flat = static_cast<Real>(flatBelow);
-  scale.flat2 = static_cast<Real>(flatBelow * flatBelow);
   scale.sign = static_cast<Real>(parameters.insideIsHigh ? 1. : -1.);
   scale.unit = static_cast<Real>(1. / this->h);
-  report.threshold = FlatBelow * gradientNoise * unitValue / this->h;
+  report.threshold = FlatBelow * noise * this->gradientNoise() * unitValue;
 
   // The passes run over taps that exist; kernels in the precision of the passes.
   const auto converted = [](const std::vector<double>& kernel)
   { return std::vector<Real>(kernel.begin(), kernel.end()); };
   std::vector<Real> kernels[3][3];
+  std::vector<std::array<double, 2>> noises[3];
   for (int a = 0; a < 3; ++a)
   {
     kernels[a][0] = converted(this->axes[a].smooth);
     kernels[a][1] = converted(this->axes[a].slope);
     kernels[a][2] = converted(this->axes[a].curve);
+    for (int i = 0; i < dims[a]; ++i)
+    {
+      noises[a].push_back(this->axes[a].noise(i));
+    }
   }
 
   int edge = 32;
@@ -461,16 +488,18 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
     const int k1 = std::min(k0 + edge, dims[2]);
     tile.j0 = j0;
     tile.j1 = std::min(j0 + edge, dims[1]);
-    tile.jr0 = std::max(0, j0 - ay.radius);
-    tile.jr1 = std::min(dims[1], tile.j1 + ay.radius);
-    tile.ring = 2 * az.radius + 1;
+    tile.jr0 = ay.start(j0);
+    tile.jr1 = ay.start(tile.j1 - 1) + ay.taps;
+    tile.ring = az.taps;
     tile.pitch = (nx + B - 1) / B * B;
     tile.planeSize = (tile.jr1 - tile.jr0) * tile.pitch;
     tile.read.resize(static_cast<std::size_t>(nx));
     tile.values.resize(tile.ring * tile.planeSize);
     tile.z.resize(3 * tile.planeSize);
-    // Rows of y and d are read and written in blocks, a kernel's reach further.
-    const std::int64_t pitch = tile.pitch + 2 * ax.radius + B;
+    // Rows of y and d are read and written in blocks, a kernel's length further.
+    const std::int64_t pitch = tile.pitch + ax.taps + B;
+    tile.flat.resize(pitch);
+    tile.flatFor.fill(-1.);
     tile.y.resize(6 * pitch);
     tile.d.resize(9 * pitch);
     tile.k.resize(5 * pitch);
@@ -480,10 +509,11 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
     std::int64_t flat = 0;
     std::int64_t missing = 0;
     std::vector<const Real*> planes(static_cast<std::size_t>(tile.ring));
-    int next = std::max(0, k0 - az.radius);
+    int next = az.start(k0);
     for (int k = k0; k < k1; ++k)
     {
-      for (; next < std::min(dims[2], k + az.radius + 1); ++next)
+      const int startZ = az.start(k);
+      for (; next < startZ + az.taps; ++next)
       {
         bool holed = false;
         for (int j = tile.jr0; j < tile.jr1; ++j)
@@ -500,48 +530,45 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
         tile.hole[next % tile.ring] = holed;
       }
       bool holed = false;
-      for (int kk = std::max(0, k - az.radius); kk < next; ++kk)
+      for (int kk = startZ; kk < next; ++kk)
       {
         holed = holed || tile.hole[kk % tile.ring];
       }
       // Along z.
-      const int firstZ = std::max(0, az.radius - k);
-      const int tapsZ = std::min(tile.ring, dims[2] + az.radius - k) - firstZ;
-      for (int t = 0; t < tapsZ; ++t)
+      for (int t = 0; t < az.taps; ++t)
       {
-        planes[t] = tile.plane(k + firstZ + t - az.radius);
+        planes[t] = tile.plane(startZ + t);
       }
+      const int skipZ = az.skip(k);
       Real* z[3];
       const Real* kz[3];
       for (int m = 0; m < 3; ++m)
       {
         z[m] = &tile.z[m * tile.planeSize];
-        kz[m] = &kernels[2][m][static_cast<std::size_t>(k) * tile.ring + firstZ];
+        kz[m] = &kernels[2][m][static_cast<std::size_t>(k) * az.taps + skipZ];
       }
-      passZ(tile.planeSize, tapsZ, planes.data(), kz[0], kz[1], kz[2], z);
+      passZ(tile.planeSize, az.taps - 2 * skipZ, planes.data() + skipZ, kz[0], kz[1], kz[2], z);
 
       for (int j = tile.j0; j < tile.j1; ++j)
       {
         // Along y.
-        const int ringY = 2 * ay.radius + 1;
-        const int firstY = std::max(0, ay.radius - j);
-        const int tapsY = std::min(ringY, dims[1] + ay.radius - j) - firstY;
+        const int skipY = ay.skip(j);
         const Real* zRows[3];
         const Real* ky[3];
         for (int m = 0; m < 3; ++m)
         {
-          zRows[m] = z[m] + (j + firstY - ay.radius - tile.jr0) * tile.pitch;
-          ky[m] = &kernels[1][m][static_cast<std::size_t>(j) * ringY + firstY];
+          zRows[m] = z[m] + (ay.start(j) + skipY - tile.jr0) * tile.pitch;
+          ky[m] = &kernels[1][m][static_cast<std::size_t>(j) * ay.taps + skipY];
         }
         Real* y[6];
         for (int m = 0; m < 6; ++m)
         {
           y[m] = &tile.y[m * pitch];
         }
-        passY(static_cast<int>(tile.pitch), tapsY, tile.pitch, zRows, ky[0], ky[1], ky[2], y);
+        passY(static_cast<int>(tile.pitch), ay.taps - 2 * skipY, tile.pitch, zRows, ky[0], ky[1],
+          ky[2], y);
 
         // Along x: one kernel inside, one per position at the borders.
-        const int ringX = 2 * ax.radius + 1;
         Real* d[9];
         for (int m = 0; m < 9; ++m)
         {
@@ -549,15 +576,22 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
         }
         const int inner = std::max(0, nx - 2 * ax.radius);
         const auto kx = [&](int m, int i)
-        { return &kernels[0][m][static_cast<std::size_t>(i) * ringX]; };
+        { return &kernels[0][m][static_cast<std::size_t>(i) * ax.taps]; };
         if (inner > 0)
         {
+          const int skip = ax.skip(ax.radius);
           Real* shifted[9];
+          const Real* from[6];
           for (int m = 0; m < 9; ++m)
           {
             shifted[m] = d[m] + ax.radius;
           }
-          passX(inner, ringX, y, kx(0, ax.radius), kx(1, ax.radius), kx(2, ax.radius), shifted);
+          for (int m = 0; m < 6; ++m)
+          {
+            from[m] = y[m] + skip;
+          }
+          passX(inner, ax.taps - 2 * skip, from, kx(0, ax.radius) + skip, kx(1, ax.radius) + skip,
+            kx(2, ax.radius) + skip, shifted);
         }
         for (int i = 0; i < nx; ++i)
         {
@@ -565,12 +599,10 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
           {
             i += inner;
           }
-          const int first = std::max(0, ax.radius - i);
-          const int last = std::min(ringX, nx + ax.radius - i);
           Real sums[9] = {};
-          for (int t = first; t < last; ++t)
+          for (int t = 0; t < ax.taps && i < nx; ++t)
           {
-            const int at = i + t - ax.radius;
+            const int at = ax.start(i) + t;
             const Real smooth = kx(0, i)[t];
             const Real slope = kx(1, i)[t];
             sums[0] += slope * y[0][at];
@@ -615,7 +647,7 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
             else if (tile.redo[i])
             {
               double fitted[9];
-              this->fitAround(tile, i, j, k, fitted);
+              this->fitAround(tile, i, j, k, noise, fitted);
               for (int m = 0; m < 9; ++m)
               {
                 d[m][i] = static_cast<Real>(fitted[m]);
@@ -623,7 +655,22 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
             }
           }
         }
-        passCurvature(nx, d[0], pitch, scale, tile.k.data());
+        // What the kernels leave of the noise: more at borders.
+        const std::array<double, 4> others{ { noises[1][j][0], noises[1][j][1], noises[2][k][0],
+          noises[2][k][1] } };
+        if (tile.flatFor != others)
+        {
+          tile.flatFor = others;
+          const double slopes =
+            std::max(others[0] * others[3], others[1] * others[2]) * FlatBelow * noise;
+          const double smooth = others[0] * others[2] * FlatBelow * noise;
+          for (int i = 0; i < nx; ++i)
+          {
+            tile.flat[i] = static_cast<Real>(
+              std::max({ noises[0][i][0] * slopes, noises[0][i][1] * smooth, 1e-15 }));
+          }
+        }
+        passCurvature(nx, d[0], tile.flat.data(), pitch, scale, tile.k.data());
         float* const wanted[4] = { fields.principal1, fields.principal2, fields.mean,
           fields.gaussian };
         for (int m = 0; m < 4; ++m)
@@ -667,76 +714,85 @@ CurvatureReport LevelSetCurvature::computeAs(const ValueReader& read,
 }
 
 //------------------------------------------------------------------------------
-// A quadratic function fitted to the values within the kernel that exist, with
-// offsets in units of h. Moments of the weights w to order 4 and of w S to order 2.
+// A cubic function fitted to the values within the kernel that exist, with offsets in
+// units of h. Moments of the weights w to order 6 and of w S to order 3.
 template <class Real>
 void LevelSetCurvature::fitAround(
-  const Tile<Real>& tile, int i, int j, int k, double derivatives[9]) const
+  const Tile<Real>& tile, int i, int j, int k, double noise, double derivatives[9]) const
 {
-  static const int powers[10][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 },
-    { 2, 0, 0 }, { 1, 1, 0 }, { 1, 0, 1 }, { 0, 2, 0 }, { 0, 1, 1 }, { 0, 0, 2 } };
-  const auto& dims = this->grid.dims;
-  const Axis& ax = this->axes[0];
-  const Axis& ay = this->axes[1];
-  const Axis& az = this->axes[2];
-  // Offsets are measured in the weights' own width along each axis.
-  double width[3];
+  constexpr int N = 20;
+  static const int powers[N][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 }, { 2, 0, 0 },
+    { 1, 1, 0 }, { 1, 0, 1 }, { 0, 2, 0 }, { 0, 1, 1 }, { 0, 0, 2 }, { 3, 0, 0 }, { 2, 1, 0 },
+    { 2, 0, 1 }, { 1, 2, 0 }, { 1, 1, 1 }, { 1, 0, 2 }, { 0, 3, 0 }, { 0, 2, 1 }, { 0, 1, 2 },
+    { 0, 0, 3 } };
+  const int at[3] = { i, j, k };
+  int start[3];
+  const double* weights[3];
+  double width[3]; // offsets are measured in the weights' own width along each axis
   for (int a = 0; a < 3; ++a)
   {
-    const int r = this->axes[a].radius;
+    const Axis& axis = this->axes[a];
+    start[a] = axis.start(at[a]);
+    weights[a] = &axis.weight[static_cast<std::size_t>(at[a]) * axis.taps];
     double sum = 0.;
     double sum2 = 0.;
-    for (int t = 0; t <= 2 * r; ++t)
+    for (int t = 0; t < axis.taps; ++t)
     {
-      sum += this->axes[a].weight[t];
-      sum2 += this->axes[a].weight[t] * (t - r) * (t - r);
+      const double offset = start[a] + t - at[a];
+      sum += weights[a][t];
+      sum2 += weights[a][t] * offset * offset;
     }
-    width[a] = r > 0 ? std::sqrt(sum2 / sum) : 1.;
+    width[a] = axis.taps > 1 ? std::sqrt(sum2 / sum) : 1.;
   }
-  double moments[5][5][5] = {};
-  double values[3][3][3] = {};
-  for (int tz = std::max(0, az.radius - k);
-       tz < std::min(2 * az.radius + 1, dims[2] + az.radius - k); ++tz)
+  double moments[7][7][7] = {};
+  double values[4][4][4] = {};
+  double squares = 0.;
+  for (int tz = 0; tz < this->axes[2].taps; ++tz)
   {
-    const Real* plane = tile.plane(k + tz - az.radius);
-    const double uz = (tz - az.radius) / width[2];
-    for (int ty = std::max(0, ay.radius - j);
-         ty < std::min(2 * ay.radius + 1, dims[1] + ay.radius - j); ++ty)
+    const Real* plane = tile.plane(start[2] + tz);
+    const double uz = (start[2] + tz - k) / width[2];
+    for (int ty = 0; ty < this->axes[1].taps; ++ty)
     {
-      const Real* row = plane + (j + ty - ay.radius - tile.jr0) * tile.pitch;
-      double w[5] = {};
-      double s[3] = {};
-      for (int tx = std::max(0, ax.radius - i);
-           tx < std::min(2 * ax.radius + 1, dims[0] + ax.radius - i); ++tx)
+      const Real* row = plane + (start[1] + ty - tile.jr0) * tile.pitch + start[0];
+      double w[7] = {};
+      double s[4] = {};
+      double s2 = 0.;
+      for (int tx = 0; tx < this->axes[0].taps; ++tx)
       {
-        const Real value = row[i + tx - ax.radius];
+        const Real value = row[tx];
         if (value == value) // no NaN; NOLINT(misc-redundant-expression)
         {
-          const double u = (tx - ax.radius) / width[0];
-          const double weight = ax.weight[tx];
+          const double u = (start[0] + tx - i) / width[0];
+          const double weight = weights[0][tx];
           const double u2 = u * u;
+          const double u3 = u2 * u;
           w[0] += weight;
           w[1] += weight * u;
           w[2] += weight * u2;
-          w[3] += weight * u2 * u;
+          w[3] += weight * u3;
           w[4] += weight * u2 * u2;
+          w[5] += weight * u3 * u2;
+          w[6] += weight * u3 * u3;
           s[0] += weight * value;
           s[1] += weight * value * u;
           s[2] += weight * value * u2;
+          s[3] += weight * value * u3;
+          s2 += weight * value * value;
         }
       }
-      const double uy = (ty - ay.radius) / width[1];
-      double wz = ay.weight[ty] * az.weight[tz];
-      for (int pz = 0; pz < 5; ++pz, wz *= uz)
+      const double uy = (start[1] + ty - j) / width[1];
+      double wz = weights[1][ty] * weights[2][tz];
+      squares += wz * s2;
+      for (int pz = 0; pz < 7; ++pz, wz *= uz)
       {
         double wyz = wz;
-        for (int py = 0; py + pz < 5; ++py, wyz *= uy)
+        for (int py = 0; py + pz < 7; ++py, wyz *= uy)
         {
-          for (int px = 0; px + py + pz < 5; ++px)
+          for (int px = 0; px + py + pz < 7; ++px)
           {
             moments[px][py][pz] += wyz * w[px];
           }
-          for (int px = 0; px + py + pz < 3; ++px)
+          for (int px = 0; px + py + pz < 4; ++px)
           {
             values[px][py][pz] += wyz * s[px];
           }
@@ -744,20 +800,25 @@ void LevelSetCurvature::fitAround(
       }
     }
   }
-  double A[10][10];
-  double b[10];
-  for (int m = 0; m < 10; ++m)
+  // A ridge far below the weights' moments bounds directions without values. Terms of
+  // third order are as likely as the values' deviation allows, and the values as the noise.
+  const double total = moments[0][0][0];
+  const double mean = values[0][0][0] / total;
+  const double variance = std::max(squares / total - mean * mean, 1e-30);
+  const double cubic = std::min(noise * noise / (Cubic * Cubic * variance), 1e3 * total);
+  double A[N][N];
+  double b[N];
+  for (int m = 0; m < N; ++m)
   {
     for (int n = 0; n <= m; ++n)
     {
       A[m][n] = moments[powers[m][0] + powers[n][0]][powers[m][1] + powers[n][1]]
                        [powers[m][2] + powers[n][2]];
     }
-    // A ridge far below the weights' moments bounds directions without values.
-    A[m][m] += m > 0 ? Ridge * moments[0][0][0] : 0.;
+    A[m][m] += m < 1 ? 0. : m < 10 ? Ridge * total : CubicRidge * total + cubic;
     b[m] = values[powers[m][0]][powers[m][1]][powers[m][2]];
   }
-  SolvePositive(10, A, b);
+  SolvePositive(N, A, b);
   for (int m = 1; m < 10; ++m)
   {
     double factor = 1.;

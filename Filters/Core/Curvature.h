@@ -51,20 +51,25 @@ struct CurvatureReport
  * and not from trace and norm of G as in the paper: k1 - k2 of a sphere would be
  * the root of a rounding error. Spheres of high values have k1 = k2 = 1/R.
  *
- * g and H are those of a quadratic function, fitted to the values around a voxel
- * by least squares with the weights of GradientMagnitude, exp(-|x|^2 / (2 sigma^2))
- * cut off at 3 sigma. In the interior the fit separates into one kernel per axis:
- * Gaussian derivatives that are exact for quadratic functions. At a border the fits
- * of the axes are one-sided, and still exact for these. Where values are missing a
- * 10x10 system of the weights' moments is solved; directions without enough values
- * give 0. What is missing thus reaches nobody beyond the kernel, and does not bend
- * the level sets beside it.
+ * g and H are those of polynomials, fitted to the values around a voxel by least
+ * squares with the weights of GradientMagnitude, exp(-|x|^2 / (2 sigma^2)) cut off at
+ * 3 sigma: exact for quadratic functions, second order for others. The fit separates
+ * into one kernel per axis. In the interior these are Gaussian derivatives. At a
+ * border the window of an axis stays as long as it is and moves inwards, its sigma
+ * growing to twice the length at the border itself; the second derivative is that of a
+ * cubic polynomial there, for one-sided fits of quadratic ones are of first order. Twice
+ * the length is what keeps its noise at that of the quadratic fit.
+ *
+ * Where values are missing a 20x20 system of the weights' moments is solved, for a
+ * cubic polynomial in space, whose terms of third order are held back as far as the
+ * noise asks for it; directions without enough values give 0. What is missing thus
+ * reaches nobody beyond the kernel, and does not bend the level sets beside it.
  *
  * Where the gradient is no more than rounding and noise make it there is no level
  * set to speak of: |g| <= 3 noise_g gives 0, |g| >= 6 noise_g the full value, with
- * a smooth passage between; noise_g is what the kernels leave of the values' noise.
- * |k| is at most 2/h, h the smallest spacing: smaller spheres fit between voxels;
- * both are shrunk alike.
+ * a smooth passage between; noise_g is what the kernels leave of the values' noise,
+ * at borders too. |k| is at most 2/h, h the smallest spacing: smaller spheres fit
+ * between voxels; both are shrunk alike.
  */
 class LevelSetCurvature
 {
@@ -80,22 +85,39 @@ public:
     const CurvatureFields& fields, const ParallelFor& parallel,
     const ProgressFunction& progress) const;
 
-  /** Voxels by which the kernel reaches out along an axis. */
+  /** Voxels by which the kernel reaches out along an axis; at a border twice that inwards. */
   int reach(int axis) const { return this->axes[axis].radius; }
 
   /** Standard deviation of a component of g, the largest, where the values' is 1. */
   double gradientNoise() const;
 
 private:
-  /** The kernels of one axis, `2 radius + 1` taps for each position along it. */
+  /** The kernels of one axis: `taps` values for each of its `size` positions. */
   struct Axis
   {
+    int size = 0;
     int radius = 0;
-    std::vector<double> weight; ///< Gaussian, not normalised, by |offset|
+    int taps = 0;               ///< 2 radius + 1, or all there are
+    bool narrow = false;        ///< in the interior the outermost taps are 0, and left out
+    std::vector<double> weight; ///< Gaussian, not normalised, for the fit beside holes
     std::vector<double> smooth; ///< value of the linear fit
     std::vector<double> slope;  ///< first derivative of the quadratic fit, per unit
-    std::vector<double> curve;  ///< second derivative, per unit^2
+    std::vector<double> curve;  ///< second derivative of the cubic fit, per unit^2
     double unit = 1.;           ///< smallest spacing / spacing: from voxels to lengths
+
+    /** The first voxel of a position's window, which lies inside. */
+    int start(int i) const
+    {
+      const int last = this->size - this->taps;
+      return i < this->radius ? 0 : i - this->radius < last ? i - this->radius : last;
+    }
+    /** Taps to leave out at either end. */
+    int skip(int i) const
+    {
+      return this->narrow && i >= this->radius && i < this->size - this->radius;
+    }
+    /** Deviation of the fit's value and slope at a position where the values' is 1. */
+    std::array<double, 2> noise(int i) const;
   };
   template <class Real>
   struct Tile;
@@ -105,7 +127,8 @@ private:
     const CurvatureFields& fields, const ParallelFor& parallel,
     const ProgressFunction& progress) const;
   template <class Real>
-  void fitAround(const Tile<Real>& tile, int i, int j, int k, double derivatives[9]) const;
+  void fitAround(
+    const Tile<Real>& tile, int i, int j, int k, double noise, double derivatives[9]) const;
 
   Grid grid;
   double h; ///< smallest spacing: the unit of length inside

@@ -262,7 +262,7 @@ void missing(Suite& suite)
       }
     }
     LT_CHECK(suite, zero);
-    // One-sided beside the wall: first order, in an edge four points wide.
+    // One-sided beside the wall, in an edge four points wide.
     LT_CHECK_NEAR(suite, error, 0., 0.2);
   }
 }
