@@ -295,7 +295,7 @@ Run SolveJacobi(const Problem& problem, int threads, std::vector<double>& phi)
     jacobi.sweep(parallelFor);
   }
   run.solve = now() - began - run.setup;
-  phi.assign(jacobi.phi().begin(), jacobi.phi().end());
+  phi.assign(jacobi.phi().data(), jacobi.phi().data() + jacobi.phi().size());
   return run;
 }
 

@@ -28,27 +28,18 @@ struct JacobiRow
   const float *x, *xS, *xN, *xB, *xT;
 };
 
+/** Reads one value before and after the row, where the faces are 0. */
 LIGHTTRANSPORT_SIMD
 void jacobi(int n, const JacobiRow& row, float* LIGHTTRANSPORT_RESTRICT out)
 {
-  const float* LIGHTTRANSPORT_RESTRICT gx = row.gx;
-  const float* LIGHTTRANSPORT_RESTRICT gy = row.gy;
-  const float* LIGHTTRANSPORT_RESTRICT gyS = row.gyS;
-  const float* LIGHTTRANSPORT_RESTRICT gz = row.gz;
-  const float* LIGHTTRANSPORT_RESTRICT gzB = row.gzB;
-  const float* LIGHTTRANSPORT_RESTRICT inverse = row.inverse;
-  const float* LIGHTTRANSPORT_RESTRICT q = row.q;
+  const float *gx = row.gx, *gy = row.gy, *gyS = row.gyS, *gz = row.gz, *gzB = row.gzB;
+  const float *inverse = row.inverse, *q = row.q;
   const float *x = row.x, *xS = row.xS, *xN = row.xN, *xB = row.xB, *xT = row.xT;
-  const auto others = [&](int i)
-  { return q[i] + gy[i] * xN[i] + gyS[i] * xS[i] + gz[i] * xT[i] + gzB[i] * xB[i]; };
-  out[0] = inverse[0] * (others(0) + gx[0] * x[n > 1 ? 1 : 0]);
-  for (int i = 1; i + 1 < n; ++i)
+  for (int i = 0; i < n; ++i)
   {
-    out[i] = inverse[i] * (others(i) + gx[i] * x[i + 1] + gx[i - 1] * x[i - 1]);
-  }
-  if (n > 1)
-  {
-    out[n - 1] = inverse[n - 1] * (others(n - 1) + gx[n - 2] * x[n - 2]);
+    out[i] = inverse[i] *
+      (q[i] + gy[i] * xN[i] + gyS[i] * xS[i] + gz[i] * xT[i] + gzB[i] * xB[i] + gx[i] * x[i + 1] +
+        gx[i - 1] * x[i - 1]);
   }
 }
 } // namespace
@@ -78,16 +69,16 @@ double Triad::pass(const ParallelFor& parallelFor)
 
 Jacobi::Jacobi(const Problem& p, const ParallelFor& parallelFor)
   : problem(p)
-  , inverse(p.q.size())
-  , from(p.q.size(), 0.f)
-  , to(p.q.size(), 0.f)
-  , zeros(static_cast<std::size_t>(p.grid.dims[0]), 0.f)
+  , inverse(p.grid.size())
+  , from(p.grid.size())
+  , to(p.grid.size())
+  , zeros(p.grid.dims[0])
 {
   const std::array<int, 3>& n = p.grid.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
-  for (std::vector<float>& faces : this->g)
+  for (Buffer<float>& faces : this->g)
   {
-    faces.assign(p.q.size(), 0.f);
+    faces.allocate(p.grid.size());
   }
   parallelFor(static_cast<std::int64_t>(n[1]) * n[2],
     [&](std::int64_t begin, std::int64_t end)
@@ -112,11 +103,11 @@ Jacobi::Jacobi(const Problem& p, const ParallelFor& parallelFor)
             diagonal += face;
             if (side > 0)
             {
-              this->g[d][static_cast<std::size_t>(i)] = static_cast<float>(face);
+              this->g[d][i] = static_cast<float>(face);
             }
           }
         }
-        this->inverse[static_cast<std::size_t>(i)] = static_cast<float>(1. / diagonal);
+        this->inverse[i] = static_cast<float>(1. / diagonal);
       }
     });
 }
@@ -145,7 +136,7 @@ void Jacobi::sweep(const ParallelFor& parallelFor)
         jacobi(n[0], row, this->to.data() + o);
       }
     });
-  this->from.swap(this->to);
+  std::swap(this->from, this->to);
 }
 } // namespace benchmark
 } // namespace lighttransport

@@ -4,6 +4,7 @@
 #ifndef DiffusionSweeps_h
 #define DiffusionSweeps_h
 
+#include "Core/Buffer.h"
 #include "DiffusionProblem.h"
 
 namespace lighttransport
@@ -33,15 +34,15 @@ class Jacobi
 public:
   Jacobi(const Problem& problem, const ParallelFor& parallelFor);
   void sweep(const ParallelFor& parallelFor);
-  const std::vector<float>& phi() const { return this->from; }
+  const Buffer<float>& phi() const { return this->from; }
   static constexpr double BytesPerVoxel = 28.;
 
 private:
   const Problem& problem;
-  std::vector<float> g[3];
-  std::vector<float> inverse;
-  std::vector<float> from, to;
-  std::vector<float> zeros;
+  Buffer<float> g[3];
+  Buffer<float> inverse;
+  Buffer<float> from, to;
+  Buffer<float> zeros;
 };
 } // namespace benchmark
 } // namespace lighttransport
