@@ -377,6 +377,28 @@ double largestRow(std::int64_t n, const double* a)
   return largestOf<double, std::uint64_t>(n, a);
 }
 
+/** Whether all values are the first one. */
+template <class T>
+LIGHTTRANSPORT_INLINE bool sameAs(std::int64_t n, const T* LIGHTTRANSPORT_RESTRICT a, T first)
+{
+  int others = 0;
+  for (std::int64_t i = 0; i < n; ++i)
+  {
+    others |= a[i] != first ? 1 : 0;
+  }
+  return others == 0;
+}
+LIGHTTRANSPORT_SIMD
+bool isSame(std::int64_t n, const float* a, float first)
+{
+  return sameAs(n, a, first);
+}
+LIGHTTRANSPORT_SIMD
+bool isSame(std::int64_t n, const double* a, double first)
+{
+  return sameAs(n, a, first);
+}
+
 /** What the solvers ask of the operator's rows. */
 struct OperatorSummary
 {
@@ -483,7 +505,8 @@ std::int64_t DiffusionSolver::rows() const
 
 std::int64_t DiffusionSolver::bytesHeld() const
 {
-  return this->A.bytes() + this->multigrid.bytes() + this->sinkWithoutShift.bytes();
+  return this->A.bytes() + this->multigrid.bytes() + this->sinkWithoutShift.bytes() +
+    this->constant.bytes();
 }
 
 //------------------------------------------------------------------------------
@@ -494,7 +517,14 @@ DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
   DiffusionReport report = this->check(medium);
   if (report.reason == StopReason::Converged)
   {
-    this->assemble(medium, {});
+    if (this->isConstant)
+    {
+      this->describe(medium);
+    }
+    else
+    {
+      this->assemble(medium, {});
+    }
     report.bytes = this->bytesHeld();
   }
   report.seconds = now() - began;
@@ -510,6 +540,8 @@ DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
   this->sinkWithoutShift.release();
   this->multigrid.release();
   this->multigridReady = false;
+  this->isConstant = false;
+  this->constant.release();
 
   const std::array<int, 3>& n = this->box.dims;
   const std::array<double, 3>& h = this->box.spacing;
@@ -627,8 +659,95 @@ DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
   {
     return bad("D / spacing^2 is too large for double precision");
   }
+  // A row that varies ends the search.
+  std::atomic<bool> same{ !outside && D[0] > T(0) && ConstantMedium::suits(this->box) };
+  if (same)
+  {
+    ForRows(this->parallelFor, this->rows(), size,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t r = begin; r < end && same; ++r)
+        {
+          if (!isSame(n[0], D + r * n[0], D[0]) ||
+            (medium.sigma_a && !isSame(n[0], medium.sigma_a + r * n[0], medium.sigma_a[0])))
+          {
+            same = false;
+          }
+        }
+      });
+  }
+  this->isConstant = same;
   report.reason = StopReason::Converged;
   return report;
+}
+
+template <class T>
+void DiffusionSolver::describe(const DiffusionMedium<T>& medium)
+{
+  const std::array<int, 3>& n = this->box.dims;
+  const std::array<double, 3>& h = this->box.spacing;
+  this->twoA =
+    medium.boundary == Boundary::Robin ? 2. * BoundaryFactor(medium.refractiveIndexRatio) : 0.;
+  this->floatMedium = DiffusionMedium<float>();
+  this->doubleMedium = DiffusionMedium<double>();
+  std::get<DiffusionMedium<T>&>(std::tie(this->floatMedium, this->doubleMedium)) = medium;
+  this->A.allocate(n); // never touched
+  this->anyWall = false;
+  this->forgetFaces();
+
+  const double D = static_cast<double>(medium.D[0]);
+  const double inverse = 1. / this->scale;
+  this->boundaryOf(medium.boundary);
+  std::array<double, 3> out{ { 0., 0., 0. } };
+  for (int d = 0; d < 3; ++d)
+  {
+    for (auto& side : this->border[d])
+    {
+      out[d] =
+        medium.boundary == Boundary::ZeroFlux ? 0. : 1. / (0.5 * h[d] + this->twoA * D) / h[d];
+      std::fill(side.begin(), side.end(), static_cast<float>(D * out[d] * inverse));
+    }
+  }
+  this->constant.setup(this->box, D * inverse,
+    medium.sigma_a ? static_cast<double>(medium.sigma_a[0]) * inverse : 0., out);
+
+  // the same rows come again and again: at the borders and between
+  OperatorSummary total;
+  total.noSink = false;
+  const std::size_t pitch = static_cast<std::size_t>(n[0]) + 1;
+  std::vector<float> store(2 * 4 * pitch, 0.f);
+  for (const int k : { 0, 1, n[2] - 1 })
+  {
+    for (const int j : { 0, 1, n[1] - 1 })
+    {
+      if (j >= n[1] || k >= n[2])
+      {
+        continue;
+      }
+      float* row = store.data() + 1;
+      float* const g[3] = { row, row + pitch, row + 2 * pitch };
+      float* s = row + 3 * pitch;
+      this->computeRow(medium, j + static_cast<std::int64_t>(n[1]) * k, g, s);
+      // the faces below are those above, where there is a voxel
+      float* below[2] = { row + 4 * pitch, row + 5 * pitch };
+      for (int d = 1; d < 3; ++d)
+      {
+        const double face = D * inverse / (h[d] * h[d]);
+        std::fill(
+          below[d - 1], below[d - 1] + n[0], (d == 1 ? j : k) > 0 ? static_cast<float>(face) : 0.f);
+      }
+      OperatorSummary part;
+      summarise(n[0], g[0], g[1], below[0], g[2], below[1], s, part);
+      total.diagonal = std::max(total.diagonal, part.diagonal);
+      total.gershgorin = std::max(total.gershgorin, part.gershgorin);
+      total.sink = total.sink || part.sink;
+      total.noSink = total.noSink || part.noSink;
+    }
+  }
+  this->largestDiagonal = static_cast<double>(total.diagonal);
+  this->gershgorin = static_cast<double>(total.gershgorin);
+  this->anySink = total.sink;
+  this->everySink = !total.noSink;
 }
 
 template <class T>
@@ -795,6 +914,7 @@ void DiffusionSolver::setOperator(const Grid& grid, DiffusionOperator&& op, doub
 {
   this->multigrid.release();
   this->multigridReady = false;
+  this->isConstant = false;
   this->shift = 0.;
   this->sinkWithoutShift.release();
   this->box = grid;
@@ -1519,6 +1639,134 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
 }
 
 template <class T>
+void DiffusionSolver::solveConstant(
+  const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
+{
+  const std::int64_t size = this->box.size();
+  const double bNorm = this->norm(b);
+  if (bNorm == 0.)
+  {
+    std::fill(phi, phi + size, 0.);
+    report.residual = 0.;
+    report.reason = StopReason::Converged;
+    return;
+  }
+  const bool dark = this->isZero(phi);
+  double rNorm = dark || !std::isfinite(bNorm) ? bNorm : this->residual<T>(b, phi, nullptr, 1.);
+  report.fineApplications += dark ? 0. : 1.;
+  report.residual = rNorm / bNorm;
+  if (!std::isfinite(rNorm))
+  {
+    report.reason = StopReason::NotFinite;
+    report.message =
+      std::isfinite(bNorm) ? "the field to start from is not finite" : "the source is not finite";
+    return;
+  }
+  const double goal = control.tolerance * bNorm;
+  if (rNorm <= goal)
+  {
+    report.reason = StopReason::Converged;
+    return;
+  }
+  // An error is told from the step that follows the last one that was needed.
+  bool estimate = control.targetError > 0. || control.timeBudget > 0.;
+  Buffer<double> x(size);
+  report.bytes = std::max(report.bytes, this->bytesHeld() + 2 * x.bytes()); // and phi
+  for (;;)
+  {
+    if (report.iterations >= control.maxIterations)
+    {
+      report.reason = rNorm <= goal ? StopReason::Converged : StopReason::MaxIterations;
+      return;
+    }
+    // 1. x = b - A phi, in double
+    SumEachRow(this->A, this->parallelFor,
+      [&](std::int64_t row, std::int64_t o, int n)
+      {
+        b.row(o, n, x.data() + o);
+        if (!dark || report.iterations > 0)
+        {
+          static thread_local std::vector<double> store;
+          store.resize(static_cast<std::size_t>(n));
+          if (this->floatMedium.D)
+          {
+            this->applyExactly(this->floatMedium, phi, row, o, n, store.data());
+          }
+          else
+          {
+            this->applyExactly(this->doubleMedium, phi, row, o, n, store.data());
+          }
+          for (int i = 0; i < n; ++i)
+          {
+            x[o + i] -= store[static_cast<std::size_t>(i)];
+          }
+        }
+        return 0.;
+      });
+    // 2. x = A^-1 x
+    if (!this->constant.solve(x.data(), this->parallelFor,
+          [&](double done) { return !control.progress || control.progress(done); }))
+    {
+      report.reason = StopReason::Cancelled;
+      report.message = "cancelled; the field is the one before";
+      return;
+    }
+    if (report.iterations > 0 && estimate)
+    {
+      Buffer<float> z(size);
+      std::copy(x.data(), x.data() + size, z.data());
+      this->estimateError(phi, z.data(), 1., report);
+      if (rNorm <= goal)
+      {
+        report.reason = StopReason::Converged;
+        return;
+      }
+    }
+    // 3. phi += x, where that is better
+    const auto add = [&](double sign)
+    {
+      ForEachRow(this->A, this->parallelFor,
+        [&](std::int64_t, std::int64_t o, int n)
+        {
+          for (std::int64_t i = o; i < o + n; ++i)
+          {
+            phi[i] += sign * x[i];
+          }
+        });
+    };
+    add(1.);
+    const double last = rNorm;
+    rNorm = this->residual<T>(b, phi, nullptr, 1.);
+    report.fineApplications += 1.;
+    ++report.iterations;
+    if (!std::isfinite(rNorm))
+    {
+      report.residual = rNorm / bNorm;
+      report.reason = StopReason::NotFinite;
+      return;
+    }
+    if (rNorm > goal && rNorm > 0.5 * last)
+    {
+      if (rNorm > last)
+      {
+        add(-1.);
+        rNorm = last;
+      }
+      report.residual = rNorm / bNorm;
+      report.reason = StopReason::Breakdown;
+      report.message = "the tolerance is below what double precision reaches here";
+      return;
+    }
+    report.residual = rNorm / bNorm;
+    if (rNorm <= goal && !estimate)
+    {
+      report.reason = StopReason::Converged;
+      return;
+    }
+  }
+}
+
+template <class T>
 void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& report) const
 {
   const double V = this->box.voxelVolume();
@@ -1707,7 +1955,14 @@ DiffusionReport DiffusionSolver::solveSteady(
       }
       b.mean = b.qScale * sum / static_cast<double>(size);
     }
-    this->conjugateGradients(b, phi, control, 0., 1., report);
+    if (this->isConstant)
+    {
+      this->solveConstant(b, phi, control, report);
+    }
+    else
+    {
+      this->conjugateGradients(b, phi, control, 0., 1., report);
+    }
     darken(); // a closed part without sink may hold any constant: it holds none
     if (singular)
     {
@@ -1742,6 +1997,13 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
   const std::array<int, 3>& n = this->box.dims;
   const std::int64_t size = this->box.size();
   std::fill(phi, phi + size, 0.);
+  if (this->isConstant)
+  {
+    this->describe(medium); // solved at once: no part of it costs less
+    report = this->solveSteady(q, phi, control);
+    report.seconds = now() - began;
+    return report;
+  }
   constexpr int edge = 8; // of a tile, as OpenVDB's leaves
   const std::array<int, 3> tiles{ { (n[0] + edge - 1) / edge, (n[1] + edge - 1) / edge,
     (n[2] + edge - 1) / edge } };

@@ -18,6 +18,7 @@
 #ifndef LightTransport_Core_Diffusion_h
 #define LightTransport_Core_Diffusion_h
 
+#include "Core/ConstantMedium.h"
 #include "Core/Grid.h"
 #include "Core/Multigrid.h"
 #include "Core/Parallel.h"
@@ -144,8 +145,9 @@ public:
   explicit DiffusionSolver(ParallelFor parallelFor = SerialFor);
 
   /**
-   * Keeps the medium's operator, with float coefficients (16 bytes per voxel), and looks at the
-   * arrays again to recompute steady residuals: they must outlive the solves. Answers
+   * Keeps the medium's operator, with float coefficients (16 bytes per voxel; none before the
+   * first time step, where D and sigma_a are constant), and looks at the arrays again to recompute
+   * steady residuals: they must outlive the solves. Answers
    * BadInput, and says where, for a D or sigma_a that is negative or not finite.
    */
   template <class T>
@@ -154,7 +156,8 @@ public:
   /**
    * Steady state: conjugate gradients, preconditioned by one multigrid cycle,
    * with the residual replaced by the recomputed one (van der Vorst and Ye 2000)
-   * every few decades.
+   * every few decades. Where D and sigma_a are constant and nothing is outside: by
+   * ConstantMedium, exactly; iterations are then corrections for double's rounding.
    *
    *   q: magnitudes up to 1e100 (norms are taken in double);
    *   phi: in, the start (zeros, or an earlier solution); out, the answer reached.
@@ -222,6 +225,9 @@ private:
   void forgetFaces();
   /** The conductance between voxel i and its next along axis d, which there is. */
   double face(int d, std::int64_t i) const;
+  /** In place of assemble where D and sigma_a are constant: the operator without its faces. */
+  template <class T>
+  void describe(const DiffusionMedium<T>& medium);
   template <class T>
   void computeRow(
     const DiffusionMedium<T>& medium, std::int64_t row, float* const g[3], float* s) const;
@@ -249,6 +255,9 @@ private:
   template <class T>
   void conjugateGradients(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
     double progressBegin, double progressEnd, DiffusionReport& report);
+  template <class T>
+  void solveConstant(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
+    DiffusionReport& report);
   /**
    * |b - A phi|, and the residual divided by rScale in r where that is asked for; from the
    * medium itself in double, or (not exactly) from the float faces that the solver works with.
@@ -306,6 +315,8 @@ private:
   Buffer<float> sinkWithoutShift; // while shift is not 0
   Multigrid multigrid;
   bool multigridReady = false;
+  bool isConstant = false; ///< D > 0 and sigma_a are the same everywhere, and it pays
+  ConstantMedium constant;
 };
 } // namespace lighttransport
 

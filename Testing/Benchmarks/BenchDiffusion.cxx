@@ -13,6 +13,7 @@
  *   step   one explicit step, beside table 4.1 of the source thesis
  *   error  the true error against time, for every knob that trades them
  *   solve  the steady solve at growing sizes: this solver, hypre, Eigen, OpenVDB, Jacobi
+ *   constant  of these, the medium that is the same everywhere alone (solve has it up to 256^3)
  * --large adds 384^3 (and 512^3 for this solver alone) with at most 3 repeats;
  * --quick is a smoke test: tiny sizes, once. Times are medians of the repeats, quotients
  * are medians of each repeat's own. Exits with 1 if this solver misses the
@@ -179,13 +180,17 @@ private:
 
 //------------------------------------------------------------------------------
 /** This project's solver from D and sigma_a to phi: all of it counts. */
-Run SolveOurs(const Problem& problem, double tolerance, int threads, std::vector<double>& phi)
+Run SolveOurs(const Problem& problem, double tolerance, int threads, std::vector<double>& phi,
+  bool iterate = false)
 {
   Run run;
   phi.assign(problem.q.size(), 0.);
+  const std::vector<std::uint8_t> nothing(iterate ? problem.q.size() : 0, 0);
   const double began = now();
   DiffusionSolver solver(OnThreads(threads));
-  const DiffusionReport medium = solver.setMedium(problem.medium());
+  DiffusionMedium<float> described = problem.medium();
+  described.outside = iterate ? nothing.data() : nullptr; // then no medium is taken for constant
+  const DiffusionReport medium = solver.setMedium(described);
   run.setup = now() - began;
   DiffusionControl control;
   control.tolerance = tolerance;
@@ -595,8 +600,12 @@ bool MeasureSolves(const Options& options, double triad)
   const ParallelFor parallelFor = OnThreads(threads);
   for (const int n : options.sizes)
   {
-    std::vector<MediumRecipe> recipes(std::begin(Recipes), std::end(Recipes));
-    if (n <= 128)
+    std::vector<MediumRecipe> recipes;
+    if (options.has("solve"))
+    {
+      recipes.assign(std::begin(Recipes), std::end(Recipes));
+    }
+    if (n <= 256 || options.has("constant"))
     {
       recipes.push_back({ 0., 0. });
     }
@@ -618,6 +627,13 @@ bool MeasureSolves(const Options& options, double triad)
       {
         entries.push_back({ "lighttransport", t,
           [&, t](std::vector<double>& phi, bool) { return SolveOurs(problem, tolerance, t, phi); },
+          {} });
+      }
+      if (problem.constant)
+      {
+        entries.push_back({ "lighttransport, iterating", threads,
+          [&](std::vector<double>& phi, bool)
+          { return SolveOurs(problem, tolerance, threads, phi, true); },
           {} });
       }
       std::unique_ptr<Hypre> hypre;
@@ -648,7 +664,7 @@ bool MeasureSolves(const Options& options, double triad)
       }
 #endif
 #ifdef BENCH_WITH_OPENVDB
-      if (problem.constant)
+      if (problem.constant && n <= 128)
       {
         entries.push_back({ "OpenVDB poisson", threads,
           [&](std::vector<double>& phi, bool)
@@ -923,7 +939,7 @@ int main(int argc, char* argv[])
     MeasureErrors(options);
   }
   bool kept = true;
-  if (options.has("solve"))
+  if (options.has("solve") || options.has("constant"))
   {
     kept = MeasureSolves(options, triad);
   }

@@ -306,7 +306,10 @@ std::vector<double> ReferenceSolution(
   std::vector<double> correction(count);
   std::vector<double> best;
   DiffusionSolver solver(parallelFor);
-  solver.setMedium(problem.medium());
+  DiffusionMedium<float> medium = problem.medium();
+  const std::vector<std::uint8_t> nothing(problem.constant ? count : 0, 0);
+  medium.outside = problem.constant ? nothing.data() : nullptr; // by iterations, constant or not
+  solver.setMedium(medium);
   residual = Residual(problem, phi.data(), r.data(), parallelFor);
   for (int i = 0; i < 10 && residual > 1e-12; ++i)
   {

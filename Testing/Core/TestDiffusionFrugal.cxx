@@ -97,6 +97,7 @@ void activeRegion(Suite& suite)
     // light that fills the volume: the full solve, and little lost on the way there
     DiffusionScene full({ { 48, 48, 48 } }, { { 1., 1., 1. } });
     full.sigma_a.assign(full.q.size(), 1e-4);
+    full.D[index(full, 40, 40, 40)] = 0.5; // not constant, which is solved at once
     full.q[index(full, 24, 24, 24)] = 1.;
     DiffusionScene active = full;
     const DiffusionReport whole = full.solve(1e-8);

@@ -1,0 +1,332 @@
+// SPDX-FileCopyrightText: The LightTransport authors
+// SPDX-License-Identifier: BSD-3-Clause
+/**
+ * A constant medium is solved at once: against the equations, closed forms and the iterations,
+ * which an empty mask of what is outside brings about.
+ */
+#include "DiffusionScene.h"
+#include "LightTransportTesting.h"
+#include "ThreadedFor.h"
+
+#include <random>
+
+using namespace lighttransport;
+using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::LookingForRaces;
+using lighttransport::testing::Suite;
+
+namespace
+{
+const Boundary Boundaries[] = { Boundary::Robin, Boundary::ZeroFlux, Boundary::Absorbing };
+
+DiffusionScene sceneOf(std::array<int, 3> dims, std::array<double, 3> spacing, Boundary boundary,
+  double D = 0.4, double sigma = 0.01)
+{
+  DiffusionScene scene(dims, spacing);
+  scene.boundary = boundary;
+  scene.refractiveIndexRatio = 1.4;
+  scene.D.assign(scene.D.size(), D);
+  scene.sigma_a.assign(scene.D.size(), sigma);
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> uniform(-0.2, 1.);
+  for (double& q : scene.q)
+  {
+    q = uniform(random);
+  }
+  return scene;
+}
+
+double largest(const std::vector<double>& values)
+{
+  double most = 0.;
+  for (const double v : values)
+  {
+    most = std::max(most, std::abs(v));
+  }
+  return most;
+}
+
+double difference(const std::vector<double>& a, const std::vector<double>& b)
+{
+  double most = 0.;
+  for (std::size_t i = 0; i < a.size(); ++i)
+  {
+    most = std::max(most, std::abs(a[i] - b[i]));
+  }
+  return most / largest(b);
+}
+
+/** The equations, as DiffusionScene has them, on shapes and spacings of all kinds. */
+void equations(Suite& suite)
+{
+  double worst = 0.;
+  for (const Boundary boundary : Boundaries)
+  {
+    for (const std::array<int, 3>& dims : { std::array<int, 3>{ { 1, 1, 1 } },
+           std::array<int, 3>{ { 2, 1, 1 } }, std::array<int, 3>{ { 1, 97, 1 } },
+           std::array<int, 3>{ { 1, 1, 513 } }, std::array<int, 3>{ { 31, 1, 30 } },
+           std::array<int, 3>{ { 1, 16, 17 } }, std::array<int, 3>{ { 3, 5, 7 } },
+           std::array<int, 3>{ { 34, 33, 9 } }, std::array<int, 3>{ { 2, 100, 3 } } })
+    {
+      for (const std::array<double, 3>& spacing : { std::array<double, 3>{ { 1., 0.7, 1.9 } },
+             std::array<double, 3>{ { 1., 1000., 1. } }, std::array<double, 3>{ { 50., 1., 7. } } })
+      {
+        DiffusionScene scene = sceneOf(dims, spacing, boundary);
+        const DiffusionReport report = scene.solve(1e-11);
+        const double residual = scene.residual();
+        const bool solved = report.reason == StopReason::Converged && residual <= 1.1e-11;
+        std::string name = "boundary " + std::to_string(static_cast<int>(boundary));
+        for (int d = 0; d < 3; ++d)
+        {
+          name += ", " + std::to_string(dims[d]) + " by " + std::to_string(spacing[d]);
+        }
+        suite.check(solved && report.iterations <= 2, name, __FILE__, __LINE__);
+        LT_CHECK_CLOSE(suite, report.absorbed + report.escaped, report.emitted, 1e-9);
+        worst = std::max(worst, residual);
+      }
+    }
+  }
+  std::cout << "largest residual " << worst << "\n";
+}
+
+/** A cosine between mirrors, a sine between dark walls: eigenvectors with known eigenvalues. */
+void eigenvectors(Suite& suite)
+{
+  const double pi = std::acos(-1.);
+  for (const Boundary boundary : { Boundary::ZeroFlux, Boundary::Absorbing })
+  {
+    const int n = 40;
+    const double h = 0.3;
+    DiffusionScene scene = sceneOf({ { n, 6, n } }, { { h, 1., h } }, boundary);
+    const bool mirrors = boundary == Boundary::ZeroFlux;
+    const auto mode = [&](double x, double, double z)
+    {
+      const double a = 3. * pi * x / (n * h);
+      const double b = 8. * pi * z / (n * h);
+      return mirrors ? std::cos(a) * std::cos(b) : std::sin(a) * std::sin(b);
+    };
+    const auto eigenvalue = [&](double k, double length, double step)
+    { return 0.4 * std::pow(2. * std::sin(0.5 * k * pi * step / length) / step, 2.); };
+    // between dark walls, one half wave along y
+    const double lambda = 0.01 + eigenvalue(3., n * h, h) + eigenvalue(8., n * h, h) +
+      (mirrors ? 0. : eigenvalue(1., 6., 1.));
+    const auto exact = [&](double x, double y, double z)
+    { return mode(x, y, z) * (mirrors ? 1. : std::sin(pi * y / 6.)); };
+    scene.fill(scene.q, [&](double x, double y, double z) { return lambda * exact(x, y, z); });
+    LT_CHECK(suite, scene.solve(1e-12).reason == StopReason::Converged);
+    LT_CHECK_NEAR(suite, scene.worst(exact), 0., 1e-12);
+  }
+}
+
+/** What iterations on stored faces answer; the same bounds, steps and flux. */
+void iterations(Suite& suite)
+{
+  for (const Boundary boundary : Boundaries)
+  {
+    for (const std::array<int, 3>& dims :
+      { std::array<int, 3>{ { 23, 20, 18 } }, std::array<int, 3>{ { 2, 1, 19 } } })
+    {
+      DiffusionScene scene = sceneOf(dims, { { 1., 0.7, 1.9 } }, boundary);
+      const std::vector<std::uint8_t> nothing(scene.q.size(), 0);
+      DiffusionMedium<double> masked = scene.medium();
+      masked.outside = nothing.data();
+      DiffusionSolver direct;
+      DiffusionSolver iterative;
+      LT_CHECK(suite, direct.setMedium(scene.medium()).reason == StopReason::Converged);
+      LT_CHECK(suite, iterative.setMedium(masked).reason == StopReason::Converged);
+      LT_CHECK(suite, direct.positivityBound() == iterative.positivityBound());
+      LT_CHECK(suite, direct.stabilityBound() == iterative.stabilityBound());
+      DiffusionControl control;
+      control.tolerance = 1e-12;
+      std::vector<double> one = scene.phi;
+      std::vector<double> other = scene.phi;
+      const DiffusionReport at = direct.solveSteady(scene.q.data(), one.data(), control);
+      const DiffusionReport by = iterative.solveSteady(scene.q.data(), other.data(), control);
+      LT_CHECK(suite, at.reason == StopReason::Converged && by.reason == StopReason::Converged);
+      LT_CHECK_NEAR(suite, difference(one, other), 0., 1e-9);
+      LT_CHECK_CLOSE(suite, at.escaped, by.escaped, 1e-8);
+      std::vector<double> E(3 * one.size());
+      std::vector<double> F(3 * one.size());
+      direct.flux(one.data(), E.data());
+      iterative.flux(one.data(), F.data());
+      LT_CHECK_NEAR(suite, difference(E, F), 0., 1e-6); // float faces
+      // a region of it is no less work than all of it
+      std::vector<double> region = scene.phi;
+      DiffusionSolver active;
+      const DiffusionReport all =
+        active.solveActive(scene.medium(), scene.q.data(), region.data(), control);
+      LT_CHECK(suite, all.reason == StopReason::Converged && all.activeFraction == 1.);
+      LT_CHECK(suite, region == one);
+      // steps have the faces made, and a steady answer is the same afterwards
+      direct.stepExplicit(scene.q.data(), one.data(), 3, direct.positivityBound(), control);
+      iterative.stepExplicit(scene.q.data(), other.data(), 3, direct.positivityBound(), control);
+      LT_CHECK_NEAR(suite, difference(one, other), 0., 1e-9);
+      direct.stepImplicit(scene.q.data(), one.data(), 2, 10., control);
+      iterative.stepImplicit(scene.q.data(), other.data(), 2, 10., control);
+      LT_CHECK_NEAR(suite, difference(one, other), 0., 1e-9);
+      const DiffusionReport again = direct.solveSteady(scene.q.data(), one.data(), control);
+      LT_CHECK(suite, again.reason == StopReason::Converged);
+      LT_CHECK_NEAR(suite, difference(one, region), 0., 1e-11);
+    }
+  }
+}
+
+void reports(Suite& suite)
+{
+  DiffusionScene scene = sceneOf({ { 40, 41, 42 } }, { { 1., 1., 1. } }, Boundary::Robin);
+  DiffusionSolver solver;
+  const DiffusionReport set = solver.setMedium(scene.medium());
+  LT_CHECK(suite, set.bytes < 4 * scene.grid.size()); // matrices of 20 x 20, and no faces
+  DiffusionControl control;
+  control.tolerance = 1e-10;
+  DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations == 1);
+  LT_CHECK(suite, report.estimatedError < 0.);
+  LT_CHECK(suite, report.bytes == 16 * scene.grid.size() + set.bytes); // phi and a value more
+  const std::vector<double> answer = scene.phi;
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations == 0);
+  LT_CHECK(suite, scene.phi == answer);
+  // from somewhere else
+  for (double& phi : scene.phi)
+  {
+    phi *= 3.;
+  }
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  LT_CHECK_NEAR(suite, difference(scene.phi, answer), 0., 1e-12);
+
+  // an error that was asked for is told, and is the error
+  control.targetError = 0.01;
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  LT_CHECK(suite, report.estimatedError >= 0. && report.estimatedError < 1e-10);
+  control.targetError = 0.;
+
+  // cancelled at each of some points: what was there stays
+  for (const int calls : { 1, 2, 3, 4 })
+  {
+    int asked = 0;
+    control.progress = [&](double fraction) { return fraction <= 1. && ++asked < calls; };
+    scene.phi.assign(scene.phi.size(), 0.25);
+    report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite, report.reason == (calls < 4 ? StopReason::Cancelled : StopReason::Converged));
+    LT_CHECK(suite, (scene.phi == std::vector<double>(scene.phi.size(), 0.25)) == (calls < 4));
+  }
+  control.progress = nullptr;
+
+  // nothing to do, no iteration allowed, more than double can give, no number
+  control.maxIterations = 0;
+  scene.phi.assign(scene.phi.size(), 0.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.residual == 1.);
+  control.maxIterations = 500;
+  control.tolerance = 1e-19;
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Breakdown && report.residual < 1e-13);
+  LT_CHECK(suite, report.iterations < 10);
+  LT_CHECK_NEAR(suite, difference(scene.phi, answer), 0., 1e-11);
+  const std::vector<double> dark(scene.q.size(), 0.);
+  report = solver.solveSteady(dark.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged && largest(scene.phi) == 0.);
+  {
+    const Suite::WithoutTraps quiet;
+    scene.q[7] = std::numeric_limits<double>::infinity();
+    report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite, report.reason == StopReason::NotFinite);
+  }
+}
+
+/** Mirrors and no absorption; nearly none; lengths and powers far from 1. */
+void extremes(Suite& suite)
+{
+  DiffusionScene scene = sceneOf({ { 20, 17, 13 } }, { { 1., 1., 2. } }, Boundary::ZeroFlux);
+  scene.sigma_a.assign(scene.q.size(), 0.);
+  DiffusionReport report = scene.solve(1e-10);
+  LT_CHECK(suite, report.reason == StopReason::NoSteadyState);
+  scene.q.assign(scene.q.size(), 0.);
+  scene.q[100] = 1.;
+  scene.q[2000] = -1.;
+  report = scene.solve(1e-10);
+  double mean = 0.;
+  for (const double phi : scene.phi)
+  {
+    mean += phi;
+  }
+  LT_CHECK(suite, report.reason == StopReason::Converged && scene.residual() <= 1.1e-10);
+  LT_CHECK_NEAR(suite, mean, 0., 1e-9);
+
+  // the mean is power / (sigma_a V): up to where phi's rounding is seen in A phi, and beyond
+  for (const double sigma : { 1e-8, 1e-14 })
+  {
+    scene.sigma_a.assign(scene.q.size(), sigma);
+    scene.q[2000] = 0.;
+    scene.phi.assign(scene.q.size(), 0.);
+    report = scene.solve(1e-7);
+    LT_CHECK(
+      suite, report.reason == (sigma > 1e-10 ? StopReason::Converged : StopReason::Breakdown));
+    mean = 0.;
+    for (const double phi : scene.phi)
+    {
+      mean += phi / static_cast<double>(scene.phi.size());
+    }
+    LT_CHECK_CLOSE(suite, mean, 1. / (sigma * 20. * 17. * 13.), 1e-9);
+  }
+
+  for (const double u : { 1e-9, 1e9 })
+  {
+    for (const double power : { 1e-100, 1e100 })
+    {
+      for (const Boundary boundary : Boundaries)
+      {
+        DiffusionScene far =
+          sceneOf({ { 15, 16, 9 } }, { { u, 2. * u, u } }, boundary, 0.4 * u, 0.01 / u);
+        for (double& q : far.q)
+        {
+          q = power * std::abs(q) / u;
+        }
+        const DiffusionReport solved = far.solve(1e-10);
+        LT_CHECK(suite, solved.reason == StopReason::Converged);
+        LT_CHECK(suite, far.residual() <= 1.1e-10 || power < 1.); // its squares underflow here
+        LT_CHECK_CLOSE(suite, solved.absorbed + solved.escaped, solved.emitted, 1e-9);
+        LT_CHECK(suite, *std::min_element(far.phi.begin(), far.phi.end()) > 0.);
+      }
+    }
+  }
+  // light that falls by many decades: nowhere negative beyond rounding
+  DiffusionScene dense = sceneOf({ { 64, 8, 8 } }, { { 1., 1., 1. } }, Boundary::Robin, 0.1, 3.);
+  dense.q.assign(dense.q.size(), 0.);
+  dense.q[0] = 1.;
+  LT_CHECK(suite, dense.solve(1e-10).reason == StopReason::Converged);
+  LT_CHECK(
+    suite, *std::min_element(dense.phi.begin(), dense.phi.end()) >= -1e-13 * largest(dense.phi));
+}
+
+/** Whatever the threads, to the bit. */
+void threads(Suite& suite)
+{
+  DiffusionScene one = sceneOf({ { 70, 33, 29 } }, { { 1., 1., 1. } }, Boundary::Robin);
+  DiffusionScene three = one;
+  LT_CHECK(suite, one.solve(1e-8).reason == StopReason::Converged);
+  three.solve(1e-8, lighttransport::testing::ThreadedFor(3));
+  LT_CHECK(suite, one.phi == three.phi);
+}
+} // namespace
+
+int main(int argc, char* argv[])
+{
+  Suite suite(argc, argv);
+  Suite::trapFloatingPoint();
+  threads(suite);
+  if (LookingForRaces)
+  {
+    return suite.result();
+  }
+  equations(suite);
+  eigenvectors(suite);
+  iterations(suite);
+  reports(suite);
+  extremes(suite);
+  return suite.result();
+}
