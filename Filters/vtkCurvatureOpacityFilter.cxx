@@ -29,6 +29,11 @@
 vtkStandardNewMacro(vtkCurvatureOpacityFilter);
 vtkCxxSetObjectMacro(vtkCurvatureOpacityFilter, OpacityFunction, vtkCurvatureOpacityFunction);
 
+namespace
+{
+constexpr int ProgressSteps = 16;
+} // namespace
+
 //------------------------------------------------------------------------------
 vtkCurvatureOpacityFilter::vtkCurvatureOpacityFilter()
 {
@@ -126,6 +131,12 @@ std::string vtkCurvatureOpacityFilter::Compute(
       return text.str();
     }
   }
+  if (mean->GetNumberOfComponents() != 1)
+  {
+    text << "the array \"" << (mean->GetName() ? mean->GetName() : "") << "\" has "
+         << mean->GetNumberOfComponents() << " components, expected one, the mean curvature";
+    return text.str();
+  }
   if (!(this->CurvatureScale >= 0. && std::isfinite(this->CurvatureScale)))
   {
     text << "CurvatureScale is " << this->CurvatureScale << ", expected a finite length >= 0";
@@ -212,17 +223,26 @@ std::string vtkCurvatureOpacityFilter::Compute(
   opacity->SetName(vtkLightTransportArrays::Opacity);
   opacity->SetNumberOfTuples(size);
   float* values = opacity->GetPointer(0);
-  vtkLightTransportParallelFor()(size,
-    [&](std::int64_t begin, std::int64_t end)
+  const auto progress = vtkLightTransportImage::Progress(this, 0., 1.);
+  for (int step = 0; step < ProgressSteps; ++step)
+  {
+    if (!progress(double(step) / ProgressSteps))
     {
-      for (std::int64_t i = begin; i < end; ++i)
+      return {}; // aborted: an empty output, no error
+    }
+    const vtkIdType first = size * step / ProgressSteps;
+    vtkLightTransportParallelFor()(size * (step + 1) / ProgressSteps - first,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        const double H = mean->GetComponent(i, 0);
-        const double z = q0 == q1 ? 0. : (quantity(i) - q0) / (q1 - q0);
-        values[i] = static_cast<float>(
-          this->OpacityFunction->Evaluate(vtkCurvatureOpacityFunction::Kappa(H, H, s), z));
-      }
-    });
+        for (std::int64_t i = first + begin; i < first + end; ++i)
+        {
+          const double H = mean->GetComponent(i, 0);
+          const double z = q0 == q1 ? 0. : (quantity(i) - q0) / (q1 - q0);
+          values[i] = static_cast<float>(
+            this->OpacityFunction->Evaluate(vtkCurvatureOpacityFunction::Kappa(H, H, s), z));
+        }
+      });
+  }
   this->ComputedCurvatureScale = s;
 
   output->ShallowCopy(input);

@@ -54,7 +54,10 @@ public:
     AlongDirection = 1,
     /** q is the distance from ViewPoint: a camera there. */
     FromViewPoint = 2,
-    /** q is a point array, SetInputArrayToProcess(1, ...); by default the active scalars. */
+    /**
+     * q is a point array, or its first component, SetInputArrayToProcess(1, ...); by default
+     * the active scalars.
+     */
     FromArray = 3
   };
 

@@ -119,6 +119,8 @@ def engine():
         ("surfaces-along-ray", True, Function.CurvatureOnly, False),
         ("dense-constant", False, None, True),
         ("dense-curvature", False, Function.CurvatureOnly, True),
+        ("dense-along-ray", False, Function.CurvatureOnly, False),
+        ("dense-front-opaque", False, Function.FrontOpaque, True),
     )
     for name, surfaces, kind, field in cases:
         mapper = lt.vtkLightTransportVolumeMapper()

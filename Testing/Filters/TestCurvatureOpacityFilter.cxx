@@ -8,9 +8,11 @@
 #include "vtkCurvatureOpacityFunction.h"
 #include "vtkLightTransportArrays.h"
 
+#include "vtkCallbackCommand.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
+#include "vtkMatrix3x3.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkUnsignedCharArray.h"
@@ -171,6 +173,38 @@ void images(Suite& suite)
   LT_CHECK_NEAR(suite, opacity->GetComponent(1, 0), 0.95, 1e-6);
 }
 
+/** Curvatures in any scalar type; a single voxel; an image that is turned. */
+void typesAndGrids(Suite& suite)
+{
+  for (int type : { VTK_SIGNED_CHAR, VTK_UNSIGNED_CHAR, VTK_SHORT, VTK_UNSIGNED_SHORT, VTK_INT,
+         VTK_LONG_LONG, VTK_FLOAT, VTK_DOUBLE })
+  {
+    auto image = makeImage(3, 2, 2, type, [](int i, int, int) { return 2. * i; });
+    vtkNew<vtkMatrix3x3> direction; // z points along x: depth along +x is the slices'
+    const double m[9] = { 0., 0., 1., 1., 0., 0., 0., 1., 0. };
+    direction->DeepCopy(m);
+    image->SetDirectionMatrix(direction);
+    image->GetPointData()->GetScalars()->SetName(vtkLightTransportArrays::MeanCurvature);
+    vtkNew<Filter> filter;
+    filter->SetInputData(image);
+    filter->SetCurvatureScale(0.1);
+    filter->SetDepthSourceToAlongDirection();
+    filter->SetDirection(1., 0., 0.);
+    filter->GetOpacityFunction()->SetKindToWideDepth();
+    filter->Update();
+    const double c = std::tanh(0.1 * 2. * 2.);
+    LT_CHECK_NEAR(suite, opacityOf(filter)->GetComponent(1, 0), 0.05 + 0.9 * c, 1e-6);
+    LT_CHECK_NEAR(suite, opacityOf(filter)->GetComponent(7, 0), 0.95, 1e-6);
+  }
+  auto one = makeImage(1, 1, 1, VTK_FLOAT, [](int, int, int) { return 0.; });
+  one->GetPointData()->GetScalars()->SetName(vtkLightTransportArrays::MeanCurvature);
+  vtkNew<Filter> filter;
+  filter->SetInputData(one);
+  filter->SetDepthSourceToAlongDirection();
+  filter->Update();
+  LT_CHECK_NEAR(suite, opacityOf(filter)->GetComponent(0, 0), 0.05, 1e-6);
+}
+
 void checkFails(Suite& suite, Filter* filter, const char* words, int line)
 {
   const std::vector<std::string> errors = errorsOfUpdate(filter);
@@ -212,6 +246,45 @@ void badInput(Suite& suite)
   checkFails(suite, filter, "MinimumOpacity is 2", __LINE__);
   filter->SetOpacityFunction(nullptr);
   checkFails(suite, filter, "OpacityFunction is not set", __LINE__);
+  filter->SetOpacityFunction(vtkNew<Function>());
+  filter->SetDepthSourceToNoDepth();
+  vtkNew<vtkDoubleArray> vectors;
+  vectors->SetName("Vectors");
+  vectors->SetNumberOfComponents(3);
+  vectors->SetNumberOfTuples(3);
+  vectors->Fill(1.);
+  vtkNew<vtkDoubleArray> few;
+  few->SetName("Few");
+  few->InsertNextValue(1.);
+  data->GetPointData()->AddArray(vectors);
+  data->GetPointData()->AddArray(few);
+  filter->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "Vectors");
+  checkFails(suite, filter, "\"Vectors\" has 3 components", __LINE__);
+  filter->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "Few");
+  checkFails(suite, filter, "\"Few\" has 1 tuples", __LINE__);
+
+  // Asked to stop: an empty output, no error.
+  filter->SetInputArrayToProcess(
+    0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkLightTransportArrays::MeanCurvature);
+  vtkNew<vtkCallbackCommand> stop;
+  stop->SetCallback(
+    [](vtkObject* caller, unsigned long, void*, void*)
+    {
+      auto* algorithm = vtkAlgorithm::SafeDownCast(caller);
+      if (algorithm->GetProgress() > 0.3)
+      {
+        algorithm->SetAbortExecute(1);
+      }
+    });
+  const unsigned long tag = filter->AddObserver(vtkCommand::ProgressEvent, stop);
+  LT_CHECK(suite, errorsOfUpdate(filter).empty());
+  LT_CHECK(
+    suite, vtkDataSet::SafeDownCast(filter->GetOutputDataObject(0))->GetNumberOfPoints() == 0);
+  filter->RemoveObserver(tag);
+  filter->SetAbortExecute(0);
+  filter->Modified();
+  filter->Update();
+  LT_CHECK(suite, opacityOf(filter) != nullptr);
 }
 } // namespace
 
@@ -221,6 +294,7 @@ int main(int argc, char* argv[])
   closedForms(suite);
   scale(suite);
   images(suite);
+  typesAndGrids(suite);
   badInput(suite);
   return suite.result();
 }

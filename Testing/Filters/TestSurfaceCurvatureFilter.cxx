@@ -11,6 +11,7 @@
 #include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCurvatures.h"
+#include "vtkFloatArray.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 
@@ -382,6 +383,76 @@ void missing(Suite& suite)
   LT_CHECK(suite, range[0] == 0. && range[1] == 0.);
 }
 
+/** Lines, points, degenerate triangles and a fin on an edge: numbers, and nothing changes far off.
+ */
+void untidy(Suite& suite)
+{
+  const int n = 48;
+  const Mesh mesh = irregular(torus, n, true, true, 0.5);
+  vtkNew<Filter> clean;
+  clean->SetInputData(mesh.data);
+  clean->Update();
+  const Mesh other = irregular(torus, n, true, true, 0.5);
+  vtkPolyData* data = other.data;
+  const vtkIdType at = 5 + n * 5; // where it is untidy
+  const vtkIdType size = data->GetNumberOfPoints();
+  double p[3];
+  data->GetPoint(at, p);
+  const vtkIdType tip = data->GetPoints()->InsertNextPoint(p[0], p[1], p[2] + 0.5);
+  const vtkIdType far = data->GetPoints()->InsertNextPoint(9., 9., 9.);
+  vtkNew<vtkCellArray> cells;
+  cells->DeepCopy(data->GetPolys());
+  const vtkIdType degenerate[5][3] = { { at, at, at + 1 }, { at, at, at }, { at, at + 1, tip },
+    { at + 1, at, tip }, { at, at + 1, at + 2 } };
+  for (const auto& triangle : degenerate)
+  {
+    cells->InsertNextCell(3, triangle);
+  }
+  data->SetPolys(cells);
+  vtkNew<vtkCellArray> lines;
+  const vtkIdType line[3] = { 0, size / 2, far };
+  lines->InsertNextCell(3, line);
+  data->SetLines(lines);
+  vtkNew<vtkCellArray> vertices;
+  vertices->InsertNextCell(1, &far);
+  data->SetVerts(vertices);
+  vtkNew<vtkFloatArray> own;
+  own->SetName("Own");
+  own->SetNumberOfTuples(data->GetNumberOfPoints());
+  own->Fill(3.);
+  data->GetPointData()->AddArray(own);
+  vtkNew<Filter> filter;
+  filter->SetInputData(data);
+  filter->Update();
+  LT_CHECK(suite, filter->GetOutput()->GetPointData()->GetArray("Own") == own.Get());
+  LT_CHECK(suite, filter->GetOutput()->GetNumberOfLines() == 1);
+  for (const char* name :
+    { vtkLightTransportArrays::PrincipalCurvature1, vtkLightTransportArrays::PrincipalCurvature2,
+      vtkLightTransportArrays::MeanCurvature, vtkLightTransportArrays::GaussianCurvature })
+  {
+    vtkDataArray* before = arrayOf(clean, name);
+    vtkDataArray* after = arrayOf(filter, name);
+    LT_CHECK(suite, after && after->GetNumberOfTuples() == size + 2);
+    bool finite = true;
+    double change = 0.;
+    for (vtkIdType i = 0; i < size; ++i)
+    {
+      finite = finite && std::isfinite(after->GetComponent(i, 0));
+      const int u = std::abs(int(i % n) - 5);
+      const int v = std::abs(int(i / n) - 5);
+      // Beyond three rings around the edge, the fit's two and the normals'.
+      if (std::min(u, n - u) > 5 || std::min(v, n - v) > 5)
+      {
+        change = std::max(change, std::abs(after->GetComponent(i, 0) - before->GetComponent(i, 0)));
+      }
+    }
+    LT_CHECK(suite, finite && std::isfinite(after->GetComponent(tip, 0)));
+    LT_CHECK(suite, after->GetComponent(far, 0) == 0.); // in no polygon
+    // The same fits, in lengths divided by a mesh of another size.
+    LT_CHECK_NEAR(suite, change, 0., 1e-4);
+  }
+}
+
 void checkPolyDataFails(Suite& suite, Filter* filter, const char* words, int line)
 {
   const std::vector<std::string> errors = errorsOfUpdate(filter);
@@ -444,6 +515,7 @@ int main(int argc, char* argv[])
   cellsOfAllKinds(suite);
   noise(suite);
   missing(suite);
+  untidy(suite);
   allowFloatingPointExceptions();
   badInput(suite);
   return suite.result();

@@ -296,10 +296,19 @@ void badInput(Suite& suite)
   filter->SetInputArrayToProcess(
     0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
 
+  vtkNew<vtkImageData> bare; // no scalars at all
+  bare->SetDimensions(4, 4, 4);
+  filter->SetInputData(bare);
+  LT_CHECK_FAILS(suite, filter, "no point array", "expected");
+
   Image spoilt = ballImage(VTK_FLOAT);
   spoilt->SetSpacing(1., 0., 1.);
   filter->SetInputData(spoilt);
   LT_CHECK_FAILS(suite, filter, "spacing", "1 0 1");
+  spoilt->SetSpacing(1., 1., -2.);
+  LT_CHECK_FAILS(suite, filter, "spacing", "1 1 -2");
+  spoilt->SetSpacing(1., NaN, 1.);
+  LT_CHECK_FAILS(suite, filter, "spacing");
   spoilt->SetSpacing(1e-16, 1., 1.);
   LT_CHECK_FAILS(suite, filter, "smallest spacing", "1e-16");
   spoilt->SetSpacing(1., 1., 1.);

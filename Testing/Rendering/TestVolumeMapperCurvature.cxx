@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /**
  * Opacity that follows curvature and depth, against closed forms: layers of an
- * isosurface, a homogeneous medium, a field of curvature on its own grid, the turn
+ * isosurface, media, a field of curvature on its own grid, the turn
  * of the normal along the ray, depth; and what leaves the superclass's picture.
  */
 #include "VolumeMapperScene.h"
@@ -20,6 +20,7 @@
 #include "vtkVolumeCurvatureProperty.h"
 #include "vtkVolumeLightingProperty.h"
 
+#include <array>
 #include <cstdio>
 
 using namespace lighttransport::testing;
@@ -249,6 +250,94 @@ void alongRay(Suite& suite)
   scaled->SetCurvatureScale(1000. * R);
   other.mapper->SetCurvatureProperty(scaled);
   LT_CHECK(suite, difference(picture, other.capture()).mean < 0.5);
+  LT_CHECK(suite, openGLErrors().empty());
+}
+
+/** A medium: curvature from a field, from the ray and depth, each against its integral. */
+void dense(Suite& suite)
+{
+  vtkNew<vtkVolumeCurvatureProperty> property;
+  const double alpha = 0.05;                  // of a unit of length
+  const double sigma = -std::log(1. - alpha); // extinction
+  const auto curved = [](double c) { return 0.05 + 0.9 * (1. - (1. - c) * (1. - c)); };
+
+  // A field of H = 0.02 x in all of it: the transmittance to the power f.
+  LitScene scene(volumeOf([](const Point&) { return 50.; }), Size, Size);
+  makeWhite(scene, alpha);
+  lookAlongZ(scene, 32.);
+  scene.mapper->SetSampleDistance(0.25F);
+  const double whole = red(scene.capture(), 32, 32);
+  LT_CHECK_NEAR(suite, whole, 255. * (1. - std::exp(-32. * sigma)), 4.);
+  auto field = makeGrid(N, N, N);
+  vtkNew<vtkDoubleArray> mean;
+  mean->SetName(vtkLightTransportArrays::MeanCurvature);
+  for (vtkIdType i = 0; i < field->GetNumberOfPoints(); ++i)
+  {
+    mean->InsertNextValue(-0.02 * field->GetPoint(i)[0]);
+  }
+  field->GetPointData()->AddArray(mean);
+  vtkNew<vtkTrivialProducer> producer;
+  producer->SetOutput(field);
+  scene.mapper->SetCurvatureFieldConnection(producer->GetOutputPort());
+  property->SetCurvatureScale(1.5);
+  scene.mapper->SetCurvatureProperty(property);
+  Picture picture = scene.capture();
+  double error = 0.;
+  for (int i = 4; i < 60; ++i)
+  {
+    const double x = 16. - (i - 32) * Pixel;
+    const double f = curved(std::tanh(1.5 * 2. * 0.02 * x));
+    error =
+      std::max(error, std::abs(red(picture, i, 32) - 255. * (1. - std::pow(1. - whole / 255., f))));
+  }
+  LT_CHECK_NEAR(suite, error, 0., 2.);
+
+  // Nearest is opaque: the mean of 0.95 (1 - z) over depth, where all is curved.
+  property->GetOpacityFunction()->SetKindToFrontOpaque();
+  property->GetOpacityFunction()->SetMinimumOpacity(0.);
+  property->SetCurvatureScale(1e6);
+  LT_CHECK_NEAR(
+    suite, red(scene.capture(), 40, 32), 255. * (1. - std::pow(1. - whole / 255., 0.95 / 2.)), 2.);
+
+  // Along the ray: |kappa| = tanh(s b / r^2) at the distances b of the ray and r of the sample
+  // from the middle of spheres; the medium is a shell, 6 < r < 13.
+  const double s = 12.;
+  LitScene shells(
+    volumeOf([](const Point& p) { return std::hypot(p[0] - 16., p[1] - 16., p[2] - 16.); }), Size,
+    Size);
+  makeWhite(shells, alpha);
+  shells.opacity->RemoveAllPoints();
+  for (const auto& node : std::vector<std::array<double, 2>>{
+         { { 5.5, 0. } }, { { 6.5, alpha } }, { { 12.5, alpha } }, { { 13.5, 0. } } })
+  {
+    shells.opacity->AddPoint(node[0], node[1]);
+  }
+  lookAlongZ(shells, 32.);
+  shells.mapper->SetSampleDistance(0.2F);
+  vtkNew<vtkVolumeCurvatureProperty> along;
+  along->SetCurvatureScale(s);
+  shells.mapper->SetCurvatureProperty(along);
+  picture = shells.capture();
+  error = 0.;
+  double largest = 0.;
+  for (int i = 8; i < 57; ++i)
+  {
+    const double b = std::abs((i - 32) * Pixel);
+    double depth = 0.;
+    const double step = 0.02;
+    for (double z = -15.; z < 15.; z += step)
+    {
+      const double r = std::hypot(b, z);
+      const double a =
+        alpha * std::min(std::min(std::max(r - 5.5, 0.), 1.), std::min(std::max(13.5 - r, 0.), 1.));
+      depth -= std::log(1. - a) * curved(std::tanh(s * b / r / r)) * step;
+    }
+    const double expected = 255. * (1. - std::exp(-depth));
+    error = std::max(error, std::abs(red(picture, i, 32) - expected));
+    largest = std::max(largest, expected);
+  }
+  std::printf("a shell by the turn of the normal: off by %.1f of %.1f\n", error, largest);
+  LT_CHECK_NEAR(suite, error, 0., 5.);
   LT_CHECK(suite, openGLErrors().empty());
 }
 
@@ -527,6 +616,7 @@ int main(int argc, char* argv[])
   layersAndMedium(suite);
   field(suite);
   alongRay(suite);
+  dense(suite);
   depth(suite);
   oriented(suite);
   betweenSurfaces(suite);
