@@ -4,7 +4,7 @@
 
 PYTHONPATH=build/dev/lib/python3/dist-packages /usr/bin/python3 Testing/Benchmarks/bench-curvature.py
 
-from the engine and the turbine blade of ../shared/data; without them the functions alone.
+from the engine and the turbine blade of ../shared/data; without them those alone that need no data.
 """
 
 import os
@@ -12,7 +12,9 @@ import sys
 import time
 
 import lighttransport as lt
+import numpy
 from vtkmodules import vtkRenderingOpenGL2, vtkRenderingVolumeOpenGL2  # noqa: F401
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkFiltersSources import vtkSphereSource
@@ -63,6 +65,45 @@ def functions():
                     kind * (side + gap) + i + j * (4 * side + 3 * gap), grey, grey, grey
                 )
     write(picture, "curvature-functions")
+
+
+def noise():
+    """Mean curvature of a noisy ball: noise of 2 and 10 grey; the slice, sigma = 1, 1.5, 2, 3 h.
+    White is 0, full red twice that of the ball, blue concave."""
+    n, radius, zoom, gap = 48, 16.0, 2, 4
+    places = numpy.indices((n, n, n)) - numpy.array((23.9, 23.6, 23.3)).reshape(3, 1, 1, 1)
+    ball = 50.0 * (1.0 - numpy.tanh((numpy.sqrt((places**2).sum(axis=0)) - radius) / 2.0))
+    random = numpy.random.default_rng(5)
+    panels = []
+    for deviation in (10.0, 2.0):  # the picture's rows go upwards
+        values = ball + deviation * random.standard_normal(ball.shape)
+        image = vtkImageData()
+        image.SetDimensions(n, n, n)
+        image.GetPointData().SetScalars(numpy_to_vtk(values.ravel(), deep=True))
+        grey = numpy.clip(55 + 1.5 * values[n // 2], 0, 255)
+        row = [numpy.repeat(grey[..., None], 3, axis=2)]
+        for sigma in (1.0, 1.5, 2.0, 3.0):
+            curvature = lt.vtkVolumeCurvatureFilter()
+            curvature.SetInputData(image)
+            curvature.SetDerivativeScale(sigma)
+            curvature.Update()
+            mean = curvature.GetOutput().GetPointData().GetArray("MeanCurvature")
+            x = vtk_to_numpy(mean).reshape(n, n, n)[n // 2] * radius / 2.0
+            red = numpy.clip(1.0 + x, 0.0, 1.0)
+            blue = numpy.clip(1.0 - x, 0.0, 1.0)
+            row.append(255 * numpy.stack((red, numpy.minimum(red, blue), blue), axis=2))
+        panels.append(row)
+    side = zoom * n
+    pixels = numpy.full((2 * side + gap, 5 * side + 4 * gap, 3), 255, numpy.uint8)
+    for j, row in enumerate(panels):
+        for i, panel in enumerate(row):
+            large = panel.repeat(zoom, axis=0).repeat(zoom, axis=1)
+            y, x = j * (side + gap), i * (side + gap)
+            pixels[y : y + side, x : x + side] = large
+    picture = vtkImageData()
+    picture.SetDimensions(pixels.shape[1], pixels.shape[0], 1)
+    picture.GetPointData().SetScalars(numpy_to_vtk(pixels.reshape(-1, 3), deep=True))
+    write(picture, "curvature-noise")
 
 
 def show(prop, position, up, zoom, name, more=(), render_pass=None):
@@ -215,6 +256,7 @@ def blade():
 
 
 functions()
+noise()
 if not os.path.exists(os.path.join(data, "engine.nii.gz")):
     print("no ../shared/data: without the other figures")
     sys.exit(0)
