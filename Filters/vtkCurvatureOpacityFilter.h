@@ -62,7 +62,7 @@ public:
   };
 
   ///@{
-  /** The function; default FocusFront. A null is an error. */
+  /** The function; default CurvatureOnly. A null is an error. */
   virtual void SetOpacityFunction(vtkCurvatureOpacityFunction* function);
   vtkGetObjectMacro(OpacityFunction, vtkCurvatureOpacityFunction);
   ///@}

@@ -72,7 +72,11 @@ public:
   };
 
   ///@{
-  /** Where the opacity comes from; default FocusFront. Other numbers are a Problem. */
+  /**
+   * Where the opacity comes from; default CurvatureOnly, whose flat parts are clear at any
+   * depth: of the presets it is what shows most behind the front on assemblies, meshes and
+   * isosurfaces (Module/Documentation/transparency.md). Other numbers are a Problem.
+   */
   vtkSetMacro(Kind, int);
   vtkGetMacro(Kind, int);
   void SetKindToFocusFront() { this->SetKind(FocusFront); }
@@ -155,7 +159,7 @@ protected:
   vtkCurvatureOpacityFunction() = default;
   ~vtkCurvatureOpacityFunction() override;
 
-  int Kind = FocusFront;
+  int Kind = CurvatureOnly;
   double MinimumOpacity = 0.05;
   double MaximumOpacity = 0.95;
   vtkPiecewiseFunction* CurvatureFunction = nullptr;

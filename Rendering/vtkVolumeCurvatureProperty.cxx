@@ -16,7 +16,6 @@ vtkCxxSetObjectMacro(vtkVolumeCurvatureProperty, OpacityFunction, vtkCurvatureOp
 vtkVolumeCurvatureProperty::vtkVolumeCurvatureProperty()
 {
   vtkNew<vtkCurvatureOpacityFunction> function;
-  function->SetKindToCurvatureOnly();
   this->SetOpacityFunction(function);
 }
 

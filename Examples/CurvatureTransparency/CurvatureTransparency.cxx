@@ -6,7 +6,6 @@
  * Without meshes, a rounded box around a ring.
  */
 #include "vtkBucketedKBufferPass.h"
-#include "vtkCurvatureOpacityFunction.h"
 #include "vtkCurvatureOpacityProperty.h"
 #include "vtkLightTransportEGLRenderWindow.h"
 
@@ -64,7 +63,6 @@ int main(int argc, char* argv[])
   vtkCurvatureOpacityProperty* curvature = surfaces->GetCurvatureOpacityProperty();
   curvature->CurvatureShadingOn();
   curvature->CurvatureOpacityOn();
-  curvature->GetOpacityFunction()->SetKindToCurvatureOnly();
   vtkNew<vtkRenderer> renderer;
   renderer->SetPass(surfaces);
   renderer->SetBackground(1., 1., 1.);

@@ -40,7 +40,6 @@ if not sources:
 surfaces = lt.vtkBucketedKBufferPass()
 surfaces.GetCurvatureOpacityProperty().CurvatureShadingOn()
 surfaces.GetCurvatureOpacityProperty().CurvatureOpacityOn()
-surfaces.GetCurvatureOpacityProperty().GetOpacityFunction().SetKindToCurvatureOnly()
 renderer = vtkRenderer()
 renderer.SetPass(surfaces)
 renderer.SetBackground(1.0, 1.0, 1.0)

@@ -162,6 +162,7 @@ void images(Suite& suite)
   filter->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "H");
   filter->SetCurvatureScale(0.5);
   filter->SetDepthSourceToAlongDirection();
+  filter->GetOpacityFunction()->SetKindToFocusFront();
   filter->Update();
   LT_CHECK(suite, vtkImageData::SafeDownCast(filter->GetOutput()) != nullptr);
   vtkDataArray* opacity = opacityOf(filter);

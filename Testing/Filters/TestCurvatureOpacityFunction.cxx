@@ -21,6 +21,7 @@ const double NaN = std::numeric_limits<double>::quiet_NaN();
 void presets(Suite& suite)
 {
   vtkNew<Function> function;
+  LT_CHECK(suite, function->GetKind() == Function::CurvatureOnly); // clear at any depth
   for (int kind = Function::FocusFront; kind <= Function::CurvatureOnly; ++kind)
   {
     function->SetKind(kind);
