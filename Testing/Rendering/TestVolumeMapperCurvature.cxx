@@ -338,6 +338,27 @@ void dense(Suite& suite)
   }
   std::printf("a shell by the turn of the normal: off by %.1f of %.1f\n", error, largest);
   LT_CHECK_NEAR(suite, error, 0., 5.);
+
+  // The same as the second of two dependent components, which makes the opacity.
+  auto two = makeGrid(N, N, N);
+  vtkNew<vtkFloatArray> pair;
+  pair->SetNumberOfComponents(2);
+  for (vtkIdType i = 0; i < two->GetNumberOfPoints(); ++i)
+  {
+    const double* p = two->GetPoint(i);
+    pair->InsertNextTuple2(50. + p[0], std::hypot(p[0] - 16., p[1] - 16., p[2] - 16.));
+  }
+  two->GetPointData()->SetScalars(pair);
+  LitScene dependent(two, Size, Size);
+  dependent.property->IndependentComponentsOff();
+  dependent.color->RemoveAllPoints();
+  dependent.color->AddRGBPoint(0., 1., 1., 1.);
+  dependent.property->SetScalarOpacity(shells.opacity);
+  dependent.property->SetScalarOpacityUnitDistance(1.);
+  lookAlongZ(dependent, 32.);
+  dependent.mapper->SetSampleDistance(0.2F);
+  dependent.mapper->SetCurvatureProperty(along);
+  LT_CHECK(suite, difference(picture, dependent.capture()).largest <= 2.);
   LT_CHECK(suite, openGLErrors().empty());
 }
 
