@@ -32,6 +32,7 @@
 #include "vtkWeakPointer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <list>
@@ -215,6 +216,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(
       }
       DiffusionControl own = control;
       own.tolerance = 0.3 * control.tolerance;
+      own.targetError = own.timeBudget = 0.; // a part of many sums to come
       const DiffusionReport report = this->solver.solveSteady(q.data(), one.phi.data(), own);
       all.iterations += report.iterations;
       all.seconds += report.seconds;
@@ -485,6 +487,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   using lighttransport::DiffusionReport;
   State& kept = *this->Kept;
 
+  const auto began = std::chrono::steady_clock::now();
+
   // 1. check the input
   std::ostringstream text;
   const vtkIdType size = input->GetNumberOfPoints();
@@ -676,13 +680,15 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   key.boundary = this->Boundary;
   key.refractiveIndexRatio = this->RefractiveIndexRatio;
   key.moment = moment;
-  // A named error or a time budget lets the filter choose: cells of two voxels and corrections on
-  // the full grid first, which reach a percent in a fraction of a full solve's time.
-  const bool chosen = this->Mode == Steady && !this->ActiveRegion && this->CoarseningFactor == 1 &&
-    !this->KeepSolutions && (this->TargetError > 0. || this->TimeBudget > 0.);
-  const bool coarse = this->Mode == Steady && (this->CoarseningFactor > 1 || chosen);
-  const bool active = this->Mode == Steady && !coarse &&
-    (this->ActiveRegion || this->TargetError > 0. || this->TimeBudget > 0.);
+  // A named error or a time budget lets the filter choose. From the last state, cells of two voxels
+  // and corrections by the full grid's equations come first: what has moved is smooth.
+  const bool named = this->TargetError > 0. || this->TimeBudget > 0.;
+  const bool chosen = this->Mode == Steady && named && !this->ActiveRegion &&
+    this->CoarseningFactor == 1 && !this->KeepSolutions;
+  const bool warm = chosen && this->Continue && kept.phi.size() == size &&
+    ((kept.coarse && key == kept.coarseKey) || (kept.valid && key == kept.key));
+  const bool coarse = this->Mode == Steady && (this->CoarseningFactor > 1 || warm);
+  const bool active = this->Mode == Steady && !coarse && this->ActiveRegion;
   const auto withMedium = [&](auto&& action) -> DiffusionReport
   {
     const auto act = [&](auto zero, const auto* d, const auto* s) -> DiffusionReport
@@ -754,11 +760,11 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       kept.coarseFactor = factor;
     }
   }
-  else if (!active && !setUpFull())
+  else if (!active && !chosen && !setUpFull())
   {
     return false;
   }
-  const bool bounds = !moment && !coarse && !active;
+  const bool bounds = !moment && !coarse && !active && !chosen;
   this->PositivityBound = bounds ? kept.solver.positivityBound() : 0.;
   this->StabilityBound = moment ? kept.moment->stabilityBound()
     : bounds                    ? kept.solver.stabilityBound()
@@ -803,7 +809,12 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     return !vtkLightTransportCheckAbort(this);
   };
   control.targetError = this->TargetError;
-  control.timeBudget = this->TimeBudget;
+  // what is left of the budget, but for writing the output
+  const auto timeLeft = [&]
+  {
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
+    return std::max(1e-9, this->TimeBudget - spent.count() - 2e-9 * static_cast<double>(size));
+  };
   if (this->IntermediateInterval > 0.)
   {
     control.intermediateInterval = this->IntermediateInterval;
@@ -829,9 +840,58 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   this->UsedTimeStep = this->Mode == Steady || local ? 0.
     : this->TimeStep > 0.                            ? this->TimeStep
                                                      : this->CourantNumber * bound;
+  // What does for a named error or within a budget, in this order.
+  const auto choose = [&](const auto* q) -> DiffusionReport
+  {
+    DiffusionReport before;
+    // A budget that the full grid's set-up may exceed: a preview, which also tells how fast this
+    // machine is today.
+    const double usual = 150e-9 * static_cast<double>(size);
+    if (this->TimeBudget > 0. && this->TimeBudget < usual && !(kept.valid && key == kept.key))
+    {
+      lighttransport::CoarseDiffusion preview(vtkLightTransportParallelFor());
+      before = withMedium([&](const auto& medium) { return preview.setMedium(medium, 4, true); });
+      if (before.reason != lighttransport::StopReason::Converged)
+      {
+        return before;
+      }
+      setupSeconds = before.seconds;
+      control.timeBudget = 1e-9;
+      before = preview.solve(q, phi.data(), control, false);
+      const double floor = 3. * (before.seconds + setupSeconds);
+      if (before.reason != lighttransport::StopReason::MaxIterations || timeLeft() < floor)
+      {
+        this->UsedCoarseningFactor = 4;
+        control.timeBudget = timeLeft();
+        if (before.reason != lighttransport::StopReason::MaxIterations || timeLeft() < 1e-6)
+        {
+          return before;
+        }
+        DiffusionReport better = preview.solve(q, phi.data(), control, true);
+        better.seconds += before.seconds;
+        better.iterations += before.iterations;
+        better.fineApplications += before.fineApplications;
+        return better;
+      }
+    }
+    if (!setUpFull())
+    {
+      before.reason = lighttransport::StopReason::BadInput;
+      before.message = problem;
+      return before;
+    }
+    control.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
+    DiffusionReport full = kept.solver.solveSteady(q, phi.data(), control);
+    full.iterations += before.iterations;
+    full.fineApplications += before.fineApplications;
+    full.seconds += before.seconds;
+    full.bytes = std::max(full.bytes, before.bytes);
+    return full;
+  };
   lighttransport::FirstMomentReport energies;
   const auto solve = [&](const auto* q) -> DiffusionReport
   {
+    control.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
     if (moment)
     {
       energies = kept.moment->step(q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
@@ -848,9 +908,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       DiffusionReport first = kept.coarse->solve(q, phi.data(), control, started && chosen);
       const bool stuck = first.reason == lighttransport::StopReason::MaxIterations ||
         first.reason == lighttransport::StopReason::NoSteadyState;
-      const double left = this->TimeBudget > 0. ? this->TimeBudget - first.seconds - setupSeconds
-                                                : std::numeric_limits<double>::max();
-      if (!chosen || !stuck || left < 2. * setupSeconds)
+      if (!chosen || !stuck || (this->TimeBudget > 0. && timeLeft() < 2. * setupSeconds))
       {
         return first;
       }
@@ -862,16 +920,17 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
         first.reason = lighttransport::StopReason::BadInput;
         return first;
       }
-      if (this->TimeBudget > 0.)
-      {
-        control.timeBudget = left;
-      }
+      control.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
       DiffusionReport full = kept.solver.solveSteady(q, phi.data(), control);
       full.iterations += first.iterations;
       full.fineApplications += first.fineApplications;
       full.seconds += first.seconds;
       full.bytes = std::max(full.bytes, first.bytes);
       return full;
+    }
+    if (chosen)
+    {
+      return choose(q);
     }
     if (active)
     {
@@ -926,8 +985,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   this->AbsorbedPower = report.absorbed;
   this->EscapedPower = report.escaped;
   this->LeakedPower = report.leaked;
-  this->EstimatedError = report.estimatedError;
-  this->EstimatedErrorL2 = report.estimatedErrorL2;
+  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
+    (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
+      this->TargetError < 1e-6);
+  // what rounding the output adds: 2^-24 at the most
+  const auto rounded = [toDouble](double estimate, double rounding)
+  { return estimate < 0. || toDouble ? estimate : std::hypot(estimate, rounding); };
+  this->EstimatedError = rounded(report.estimatedError, 5.5e-8);
+  this->EstimatedErrorL2 = rounded(report.estimatedErrorL2, 3e-8);
   this->ActiveFraction = report.activeFraction;
 
   const bool usable = this->StopReason == Converged || this->StopReason == MaxIterations ||
@@ -952,9 +1017,6 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
 
   // 4. the arrays
-  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
-    (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
-      this->TargetError < 1e-6);
   const double extreme = largestOf(phi.data(), size, parallel, bad);
   if (!toDouble && extreme > static_cast<double>(std::numeric_limits<float>::max()))
   {

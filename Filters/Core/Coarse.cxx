@@ -196,7 +196,8 @@ void CoarseDiffusion::load(std::int64_t row, float* D, float* s) const
 
 //------------------------------------------------------------------------------
 template <class T>
-DiffusionReport CoarseDiffusion::setMedium(const DiffusionMedium<T>& medium, int factor)
+DiffusionReport CoarseDiffusion::setMedium(
+  const DiffusionMedium<T>& medium, int factor, bool inHaste)
 {
   const double began = now();
   DiffusionReport report = this->solver.check(medium);
@@ -205,6 +206,7 @@ DiffusionReport CoarseDiffusion::setMedium(const DiffusionMedium<T>& medium, int
     return report;
   }
   this->fine = this->coarse = medium.grid;
+  this->hasty = inHaste;
   this->scale = this->solver.scale;
   this->floatMedium = DiffusionMedium<float>();
   this->doubleMedium = DiffusionMedium<double>();
@@ -587,8 +589,8 @@ void CoarseDiffusion::sinks(DiffusionOperator& C)
   const std::int64_t rows = static_cast<std::int64_t>(n[1]) * n[2];
   const auto loader = [this](std::int64_t r, float* D, float* s) { this->load(r, D, s); };
   // one sweep from 1
-  Buffer<std::uint8_t> first(this->fine.size());
-  ForRows(this->parallelFor, rows, this->fine.size(),
+  Buffer<std::uint8_t> first(this->hasty ? 0 : this->fine.size());
+  ForRows(this->parallelFor, this->hasty ? 0 : rows, this->fine.size(),
     [&](std::int64_t begin, std::int64_t end)
     {
       Around a(n[0]);
@@ -627,6 +629,22 @@ void CoarseDiffusion::sinks(DiffusionOperator& C)
         {
           const std::int64_t r = J * this->factors[1] + at % ny +
             static_cast<std::int64_t>(n[1]) * (K * this->factors[2] + at / ny);
+          float* out = left.data() + static_cast<std::size_t>(at) * length;
+          float* sink = s.data() + static_cast<std::size_t>(at) * length;
+          if (this->hasty)
+          {
+            // one sweep, were all around like the voxel itself
+            float* D = Ds.data() + static_cast<std::size_t>(at) * length;
+            this->load(r, D, sink);
+            const float all = 2.f * (this->perD[0] + this->perD[1] + this->perD[2]);
+            for (int i = 0; i < n[0]; ++i)
+            {
+              out[i] = all * D[i] / std::max(all * D[i] + sink[i], LeastD);
+              float& b = best[static_cast<std::size_t>(i >> this->shift)];
+              b = std::max(b, out[i]);
+            }
+            continue;
+          }
           facesAround(a, this->fine, this->perD, r, true, loader);
           sumFaces(n[0], a.west(), a.east(), a.south(), a.north(), a.bottom(), a.top(), a.den());
           const std::uint8_t* own = first.data() + r * n[0];
@@ -636,8 +654,6 @@ void CoarseDiffusion::sinks(DiffusionOperator& C)
           const std::uint8_t* N = r % n[1] + 1 < n[1] ? own + n[0] : own;
           const std::uint8_t* B = r / n[1] > 0 ? own - slice : own;
           const std::uint8_t* T = r / n[1] + 1 < n[2] ? own + slice : own;
-          float* out = left.data() + static_cast<std::size_t>(at) * length;
-          float* sink = s.data() + static_cast<std::size_t>(at) * length;
           std::copy(a.s(), a.s() + n[0], sink);
           std::copy(a.D(), a.D() + n[0], Ds.data() + static_cast<std::size_t>(at) * length);
           for (int i = 0; i < n[0]; ++i)
@@ -1091,15 +1107,23 @@ DiffusionReport CoarseDiffusion::solve(
       one.reason == StopReason::Breakdown;
   };
   bool whole = true; // phi is a field that may be shown
+  double pass = 0.;  // seconds of a simple pass over the voxels
+  const auto inTime = [&](double seconds)
+  { return !this->hasty || now() - began + seconds < control.timeBudget; };
   if (!fromPhi)
   {
     this->restrict(q, b.data());
     std::fill(phi, phi + size, 0.);
     whole = solveCells(named ? 1e-5 : std::max(control.tolerance, 1e-8));
+    const double solved = now();
     this->prolong(x.data(), phi);
-    this->relax(q, phi);
-    this->relax(q, phi);
-    report.fineApplications += 5.;
+    pass = now() - solved;
+    for (int i = 0; i < 2 && inTime(4. * pass); ++i)
+    {
+      this->relax(q, phi);
+      report.fineApplications += 1.;
+    }
+    report.fineApplications += 3.;
   }
 
   // What the cells' equations make of the residual that is left corrects phi (a two-grid method);
@@ -1120,7 +1144,8 @@ DiffusionReport CoarseDiffusion::solve(
       report.reason = StopReason::Cancelled;
       break;
     }
-    if (control.timeBudget > 0. && i > 0 && start - began + spent > control.timeBudget)
+    if ((control.timeBudget > 0. && i > 0 && start - began + spent > control.timeBudget) ||
+      (i == 0 && !inTime(std::max(8. * pass, 1e-8 * static_cast<double>(size)))))
     {
       report.reason = StopReason::MaxIterations;
       report.message = "the time budget is used up";
@@ -1173,6 +1198,12 @@ DiffusionReport CoarseDiffusion::solve(
       control.intermediate(phi);
       shown = now();
     }
+  }
+  if (whole && named && report.estimatedError < 0. && report.reason == StopReason::MaxIterations)
+  {
+    // What cells of several voxels leave without a correction is of the order of the field.
+    report.estimatedError = report.estimatedErrorL2 = 1.;
+    report.message = "the time budget is used up before the error could be estimated: 1 is a guess";
   }
   if (whole && report.reason != StopReason::Cancelled)
   {
@@ -1312,7 +1343,7 @@ void CoarseDiffusion::balance(const Q* q, const double* phi, DiffusionReport& re
 }
 
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
-  template DiffusionReport CoarseDiffusion::setMedium<T>(const DiffusionMedium<T>&, int);          \
+  template DiffusionReport CoarseDiffusion::setMedium<T>(const DiffusionMedium<T>&, int, bool);    \
   template DiffusionReport CoarseDiffusion::solve<T>(                                              \
     const T*, double*, const DiffusionControl&, bool);
 LIGHTTRANSPORT_INSTANTIATE(float)

@@ -38,9 +38,11 @@ public:
   /**
    * factor: 1 .. 8 voxels of the finest axis per cell; 1 is the full grid itself. The medium's
    * arrays must outlive the solves. Answers BadInput as DiffusionSolver::setMedium does.
+   * In haste, psi is told from each voxel alone, and solve leaves out sweeps and corrections for
+   * which control.timeBudget is too short: a third of the time of the least that is done otherwise.
    */
   template <class T>
-  DiffusionReport setMedium(const DiffusionMedium<T>& medium, int factor);
+  DiffusionReport setMedium(const DiffusionMedium<T>& medium, int factor, bool inHaste = false);
 
   /**
    * phi: in, with fromPhi, the start; out, the answer reached. Without a named error or a time
@@ -104,6 +106,7 @@ private:
   ParallelFor parallelFor;
   Grid fine, coarse;
   std::array<int, 3> factors{ { 1, 1, 1 } };
+  bool hasty = false;
   int shift = 0; // of factors[0], a power of 2 as all
   DiffusionMedium<float> floatMedium;
   DiffusionMedium<double> doubleMedium;

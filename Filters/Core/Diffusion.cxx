@@ -3,6 +3,7 @@
 #include "Core/Diffusion.h"
 
 #include "Core/Kernel.h"
+#include "Core/SlowError.h"
 
 #include <algorithm>
 #include <atomic>
@@ -1245,65 +1246,72 @@ void DiffusionSolver::estimateError(
   const double* phi, const float* z, double step, DiffusionReport& report) const
 {
   const DiffusionOperator& op = this->A;
-  const auto sum = [&](auto&& term)
+  struct Row
   {
-    return SumEachRow(op, this->parallelFor,
-      [&](std::int64_t, std::int64_t o, int n)
+    double largest = 0., errors = 0., values = 0.;
+  };
+  std::vector<Row> rows(static_cast<std::size_t>(op.numberOfRows()));
+  const auto forRows = [&](std::int64_t every, auto&& action)
+  {
+    ForRows(this->parallelFor, (op.numberOfRows() + every - 1) / every, op.activeSize / every,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        double s = 0.;
-        for (std::int64_t i = o; i < o + n; ++i)
+        for (std::int64_t t = begin * every; t < end * every && t < op.numberOfRows(); t += every)
         {
-          s += term(i);
+          const std::int64_t row = op.row(t);
+          const Span span = op.span(row);
+          action(t, row * op.dims[0] + span.begin, row * op.dims[0] + span.end);
         }
-        return s;
       });
   };
-  std::vector<double> rowLargest(static_cast<std::size_t>(op.numberOfRows()), 0.);
-  ForRows(this->parallelFor, op.numberOfRows(), op.activeSize,
-    [&](std::int64_t begin, std::int64_t end)
+  forRows(1,
+    [&](std::int64_t t, std::int64_t from, std::int64_t to)
     {
-      for (std::int64_t t = begin; t < end; ++t)
+      Row one;
+      for (std::int64_t i = from; i < to; ++i)
       {
-        const std::int64_t row = op.row(t);
-        const Span span = op.span(row);
-        double m = 0.;
-        for (std::int64_t i = row * op.dims[0] + span.begin; i < row * op.dims[0] + span.end; ++i)
-        {
-          m = std::max(m, std::abs(phi[i]));
-        }
-        rowLargest[static_cast<std::size_t>(t)] = m;
+        const double error = step * static_cast<double>(z[i]);
+        const double value = phi[i] + error;
+        one.largest = std::max(one.largest, std::abs(value));
+        one.errors += error * error;
+        one.values += value * value;
       }
+      rows[static_cast<std::size_t>(t)] = one;
     });
-  const double largest = *std::max_element(rowLargest.begin(), rowLargest.end());
-  // |error| / |phi| in bins of a sixteenth of an octave: the top 13 bits of a float
+  Row total;
+  for (const Row& one : rows)
+  {
+    total.largest = std::max(total.largest, one.largest);
+    total.errors += one.errors;
+    total.values += one.values;
+  }
+  report.estimatedErrorL2 = total.values > 0. ? std::sqrt(total.errors / total.values) : 0.;
+  // Some hundred thousand voxels tell the percentile. |error| / |phi| in bins of a sixteenth of an
+  // octave: the top 13 bits of a float.
+  const std::int64_t every = std::max<std::int64_t>(1, op.activeSize / 300000) | 1;
   constexpr int shift = 19;
   std::vector<std::int64_t> counts(std::size_t(1) << (31 - shift), 0);
   std::mutex guard;
-  ForRows(this->parallelFor, op.numberOfRows(), op.activeSize,
-    [&](std::int64_t begin, std::int64_t end)
+  forRows(every,
+    [&](std::int64_t, std::int64_t from, std::int64_t to)
     {
-      std::vector<std::int64_t> mine(counts.size(), 0);
-      for (std::int64_t t = begin; t < end; ++t)
+      std::vector<std::uint32_t> bins;
+      for (std::int64_t i = from; i < to; ++i)
       {
-        const std::int64_t row = op.row(t);
-        const Span span = op.span(row);
-        for (std::int64_t i = row * op.dims[0] + span.begin; i < row * op.dims[0] + span.end; ++i)
+        const double error = step * static_cast<double>(z[i]);
+        const double value = std::abs(phi[i] + error);
+        if (value >= 1e-6 * total.largest && value > 0.)
         {
-          const double error = step * static_cast<double>(z[i]);
-          const double value = std::abs(phi[i] + error);
-          if (value >= 1e-6 * largest && value > 0.)
-          {
-            const float ratio = static_cast<float>(std::min(std::abs(error) / value, 1e30));
-            std::uint32_t bits;
-            std::memcpy(&bits, &ratio, sizeof(bits));
-            ++mine[bits >> shift];
-          }
+          const float ratio = static_cast<float>(std::min(std::abs(error) / value, 1e30));
+          std::uint32_t bits;
+          std::memcpy(&bits, &ratio, sizeof(bits));
+          bins.push_back(bits >> shift);
         }
       }
       const std::lock_guard<std::mutex> lock(guard);
-      for (std::size_t i = 0; i < counts.size(); ++i)
+      for (const std::uint32_t bin : bins)
       {
-        counts[i] += mine[i];
+        ++counts[bin];
       }
     });
   std::int64_t all = 0;
@@ -1321,15 +1329,6 @@ void DiffusionSolver::estimateError(
   float ratio;
   std::memcpy(&ratio, &bits, sizeof(ratio));
   report.estimatedError = static_cast<double>(ratio);
-  const double errors =
-    sum([&](std::int64_t i) { return step * step * double(z[i]) * double(z[i]); });
-  const double values = sum(
-    [&](std::int64_t i)
-    {
-      const double v = phi[i] + step * double(z[i]);
-      return v * v;
-    });
-  report.estimatedErrorL2 = values > 0. ? std::sqrt(errors / values) : 0.;
 }
 
 //------------------------------------------------------------------------------
@@ -1447,8 +1446,23 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   bool fresh = true;
   std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()), 0.);
   double seen = began;
+  const bool named = control.targetError > 0. || control.timeBudget > 0.;
+  SlowError slow;
+  double lastEstimate = began;
+  double rEstimated = 0.; // the residual's norm when the error was estimated
+  // The estimate is of the iterate before: no better than by what the residual has shrunk.
+  const auto renew = [&]
+  {
+    if (rEstimated > 0.)
+    {
+      report.estimatedError *= std::min(1., rNorm / rEstimated);
+      report.estimatedErrorL2 *= std::min(1., rNorm / rEstimated);
+      rEstimated = rNorm;
+    }
+  };
   const auto finish = [&](StopReason reason)
   {
+    renew();
     const double last = this->residual<T>(b, phi, nullptr, 1.);
     report.fineApplications += 1.;
     report.residual = last / bNorm;
@@ -1482,28 +1496,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       cancel();
       return;
     }
-    // 2. how far off is phi? B r is the error that a cycle sees; where slow components are
-    //    left, the step along it was longer than 1.
-    if (control.targetError > 0. || control.timeBudget > 0.)
-    {
-      this->estimateError(phi, z.data(), rScale * std::max(1., alpha), report);
-      if (iteration > 0 && control.targetError > 0. &&
-        report.estimatedError <= 0.5 * control.targetError)
-      {
-        finish(StopReason::Converged);
-        report.reason = StopReason::Converged;
-        return;
-      }
-      const double perIteration = (now() - began) / (iteration + 1);
-      if (iteration > 0 && control.timeBudget > 0. &&
-        now() - began + perIteration > control.timeBudget)
-      {
-        finish(StopReason::MaxIterations);
-        report.message = "the time budget is used up";
-        return;
-      }
-    }
-    // 3. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
+    // 2. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
     //    since a cycle in float is not quite linear
     double rzNew = 0.;
     double zAp = 0.;
@@ -1539,8 +1532,34 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       : frugal                                    ? rzNew / rz * (rScale / pScale)
                                                   : -alpha * zAp / rz;
     pScale = rScale;
+    const bool restarted = restart;
     restart = false;
     rz = rzNew;
+    // 3. how far off is phi? B r is the error that a cycle sees; the iteration tells what it
+    // misses.
+    const double rzOfPhi = rz * rScale * rScale;
+    if (named)
+    {
+      this->estimateError(phi, z.data(), rScale * slow.factor(rzOfPhi), report);
+      rEstimated = rNorm;
+      if (iteration > 0 && control.targetError > 0. &&
+        report.estimatedError <= 0.5 * control.targetError)
+      {
+        finish(StopReason::Converged);
+        report.reason = StopReason::Converged;
+        return;
+      }
+      // another iteration, and the last look at the residual
+      const double perIteration = now() - lastEstimate;
+      lastEstimate = now();
+      if (iteration > 0 && control.timeBudget > 0. &&
+        lastEstimate - began + 1.5 * perIteration > control.timeBudget)
+      {
+        finish(StopReason::MaxIterations);
+        report.message = "the time budget is used up";
+        return;
+      }
+    }
     // 4. alpha = r . z / p . A p, with A p = A z + beta A p_old but where the residual was
     //    recomputed: there A p is as well
     double pAp = 0.;
@@ -1569,6 +1588,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       return;
     }
     alpha = rz / pAp;
+    slow.add(alpha, rzOfPhi, restarted);
     // 5. phi += alpha p, r -= alpha A p; not interrupted: phi stays a whole
     rNorm = rScale *
       std::sqrt(SumEachRow(op, this->parallelFor,
@@ -1596,6 +1616,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       fresh = true;
       if (claims && rNorm <= goal)
       {
+        renew();
         report.reason = StopReason::Converged;
         return;
       }

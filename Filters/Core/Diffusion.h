@@ -82,7 +82,8 @@ struct DiffusionReport
   /**
    * Of phi against the exact solution of the discrete equations, over the voxels within
    * six decades of the largest |phi|: the 95th percentile of |error| / |phi|, and the relative
-   * Euclidean norm; estimated from the last iteration. Negative where nothing was estimated.
+   * Euclidean norm; estimated from the last iteration, see SlowError.h. Negative where nothing was
+   * estimated.
    */
   double estimatedError = -1.;
   double estimatedErrorL2 = -1.;

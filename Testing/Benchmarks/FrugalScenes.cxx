@@ -96,8 +96,6 @@ Seed At(vtkImageData* medium, double x, double y, double z, double radius = 1.5,
   double h[3];
   medium->GetDimensions(dims);
   medium->GetSpacing(h);
-  double bounds[6];
-  medium->GetBounds(bounds);
   vtkDataArray* D = medium->GetPointData()->GetArray(vtkLightTransportArrays::DiffusionCoefficient);
   const double part[3] = { x, y, z };
   int at[3], best[3] = { 0, 0, 0 };
@@ -126,8 +124,11 @@ Seed At(vtkImageData* medium, double x, double y, double z, double radius = 1.5,
     }
   }
   const double smallest = std::min(h[0], std::min(h[1], h[2]));
-  return { bounds[0] + best[0] * h[0], bounds[2] + best[1] * h[1], bounds[4] + best[2] * h[2],
-    radius * smallest, power };
+  const int* extent = medium->GetExtent();
+  double world[3];
+  medium->TransformIndexToPhysicalPoint(
+    extent[0] + best[0], extent[2] + best[1], extent[4] + best[2], world);
+  return { world[0], world[1], world[2], radius * smallest, power };
 }
 
 double Smoothstep(double a, double b, double t)
@@ -198,8 +199,9 @@ Function Labyrinth(int n, int width, double wall, unsigned seed)
 }
 
 #ifdef BENCH_WITH_READERS
-/** The file's image, cut or thinned out to `most` voxels per axis around a point. */
-Image Read(const std::string& path, int most, const int* around = nullptr)
+/** The file's image, cut to `most` voxels per axis around a voxel, or a point in parts of it. */
+Image Read(
+  const std::string& path, int most, const int* around = nullptr, const double* part = nullptr)
 {
   Image image;
   try
@@ -216,7 +218,8 @@ Image Read(const std::string& path, int most, const int* around = nullptr)
   int voi[6];
   for (int d = 0; d < 3; ++d)
   {
-    const int middle = around ? around[d] : dims[d] / 2;
+    const int middle =
+      around ? around[d] : static_cast<int>((part ? part[d] : .5) * static_cast<double>(dims[d]));
     const int from = std::max(0, std::min(dims[d] - most, middle - most / 2));
     voi[2 * d] = extent[2 * d] + from;
     voi[2 * d + 1] = extent[2 * d] + std::min(dims[d], from + most) - 1;
@@ -310,7 +313,7 @@ std::vector<Scene> Scenes(int n, int most, const std::string& data)
 {
   std::vector<Scene> scenes;
   const auto add = [&](const std::string& name, const std::function<Image()>& make) {
-    scenes.push_back({ name, false, make });
+    scenes.push_back({ name, false, [make](std::string&) { return make(); } });
   };
   const std::array<double, 3> one{ { 1., 1., 1. } };
   const std::array<int, 3> cube{ { n, n, n } };
@@ -498,7 +501,7 @@ std::vector<Scene> Scenes(int n, int most, const std::string& data)
   for (const Real& r : reals)
   {
     scenes.push_back({ r.name, true,
-      [r, most]() -> Image
+      [r, most](std::string&) -> Image
       {
         const bool any = r.voxel[0] + r.voxel[1] + r.voxel[2] > 0;
         Image image = Read(r.path, most, any ? r.voxel : nullptr);
@@ -526,6 +529,414 @@ std::vector<Scene> Scenes(int n, int most, const std::string& data)
           });
         return WithSeeds(m, { At(m, .5, .5, .5) });
       } });
+  }
+#else
+  (void)data, (void)most;
+#endif
+  return scenes;
+}
+//------------------------------------------------------------------------------
+// Scenes drawn at random: none of them is known before it is judged.
+
+namespace
+{
+/** Numbers that are the same everywhere: std's distributions are not. */
+class Draw
+{
+public:
+  explicit Draw(unsigned seed)
+    : engine(seed)
+  {
+  }
+  double uniform(double from, double to)
+  {
+    return from + (to - from) * (static_cast<double>(this->engine()) / 4294967296.);
+  }
+  double logarithmic(double from, double to)
+  {
+    return std::exp(this->uniform(std::log(from), std::log(to)));
+  }
+  int integer(int from, int to)
+  {
+    return std::min(to, static_cast<int>(std::floor(this->uniform(from, to + 1.))));
+  }
+  bool chance(double part) { return this->uniform(0., 1.) < part; }
+
+private:
+  std::mt19937 engine;
+};
+
+/** Lights anywhere, most of them where matter is clear; some with a dark one among them. */
+std::vector<Seed> RandomLights(Draw& draw, vtkImageData* medium, std::string& name)
+{
+  const int number = draw.chance(.4) ? 1 : draw.integer(2, 6);
+  const bool both = number > 1 && draw.chance(.4);
+  name += ", " + std::to_string(number) + (number > 1 ? " lights" : " light") +
+    (both ? " of both signs" : "");
+  std::vector<Seed> seeds;
+  for (int i = 0; i < number; ++i)
+  {
+    const double x = draw.uniform(.15, .85);
+    const double y = draw.uniform(.15, .85);
+    const double z = draw.uniform(.15, .85);
+    const double radius = draw.uniform(1., 4.);
+    const double power = draw.uniform(.3, 2.) * (both && i % 2 ? -.8 : 1.);
+    seeds.push_back(At(medium, x, y, z, radius, power));
+  }
+  return seeds;
+}
+
+/** D and sigma_a from one of several recipes; D is between `least` and 1 parts of `length`. */
+std::function<double(double)> RandomAbsorption(Draw& draw, double length, std::string& name)
+{
+  char text[64];
+  if (draw.chance(.5))
+  {
+    const double rest = draw.logarithmic(1e-4, .2);
+    std::snprintf(text, sizeof text, ", albedo 1 - %.1g", rest);
+    name += text;
+    return [=](double D) { return rest / (3. * D); };
+  }
+  const double reach = draw.logarithmic(5., 200.) * length;
+  std::snprintf(text, sizeof text, ", reach %.2g", reach);
+  name += text;
+  return [=](double D) { return (1. - D / length) / length + D / (reach * reach); };
+}
+
+/** A random D in (0, 1] of a kind that the fixed scenes do not have. */
+Function RandomShape(Draw& draw, std::string& name)
+{
+  const double wall = draw.logarithmic(1e-6, .1);
+  char text[64];
+  std::snprintf(text, sizeof text, ", wall %.1g", wall);
+  const int kind = draw.integer(0, 6);
+  struct Ball
+  {
+    double x, y, z, r, value;
+  };
+  if (kind == 0) // a tree of vessels
+  {
+    struct Piece
+    {
+      double a[3], b[3], r;
+    };
+    std::vector<Piece> pieces;
+    double radius = draw.uniform(.04, .1);
+    std::vector<std::array<double, 3>> tips{ { { .5, .5, .05 } } };
+    for (int level = 0; level < 5; ++level, radius *= .75)
+    {
+      std::vector<std::array<double, 3>> next;
+      for (const std::array<double, 3>& tip : tips)
+      {
+        for (int branch = 0; branch < (level ? 2 : 1); ++branch)
+        {
+          std::array<double, 3> end;
+          for (int d = 0; d < 3; ++d)
+          {
+            end[static_cast<std::size_t>(d)] = std::min(.98,
+              std::max(.02,
+                tip[static_cast<std::size_t>(d)] + draw.uniform(-.25, .25) + (d == 2 ? .15 : 0.)));
+          }
+          pieces.push_back({ { tip[0], tip[1], tip[2] }, { end[0], end[1], end[2] }, radius });
+          next.push_back(end);
+        }
+      }
+      tips = next;
+    }
+    name += "vessels" + std::string(text);
+    return [=](double x, double y, double z)
+    {
+      const double p[3] = { x, y, z };
+      for (const Piece& piece : pieces)
+      {
+        double along = 0., length = 0., far = 0.;
+        for (int d = 0; d < 3; ++d)
+        {
+          const double e = piece.b[d] - piece.a[d];
+          along += (p[d] - piece.a[d]) * e;
+          length += e * e;
+        }
+        along = std::min(1., std::max(0., along / std::max(length, 1e-12)));
+        for (int d = 0; d < 3; ++d)
+        {
+          const double e = p[d] - piece.a[d] - along * (piece.b[d] - piece.a[d]);
+          far += e * e;
+        }
+        if (far < piece.r * piece.r)
+        {
+          return 1.;
+        }
+      }
+      return wall;
+    };
+  }
+  std::vector<Ball> balls(static_cast<std::size_t>(draw.integer(8, 60)));
+  for (Ball& ball : balls)
+  {
+    ball.x = draw.uniform(0., 1.);
+    ball.y = draw.uniform(0., 1.);
+    ball.z = draw.uniform(0., 1.);
+    ball.r = draw.uniform(.05, .2);
+    ball.value = std::pow(wall, draw.uniform(0., 1.));
+  }
+  if (kind == 1 || kind == 2) // a foam: clear cells and their walls; or cells of any D
+  {
+    const double thick = draw.uniform(.02, .06);
+    name += kind == 1 ? "foam" + std::string(text) : "grains" + std::string(text);
+    return [=](double x, double y, double z)
+    {
+      double first = 9., second = 9., value = 1.;
+      for (const Ball& ball : balls)
+      {
+        const double r = std::hypot(x - ball.x, std::hypot(y - ball.y, z - ball.z));
+        if (r < first)
+        {
+          second = first;
+          first = r;
+          value = ball.value;
+        }
+        else
+        {
+          second = std::min(second, r);
+        }
+      }
+      return kind == 2 ? value : (second - first < thick ? wall : 1.);
+    };
+  }
+  if (kind == 3) // balls in matter, clear or dense
+  {
+    const bool clear = draw.chance(.5);
+    name += (clear ? "clear balls" : "dense balls") + std::string(text);
+    return [=](double x, double y, double z)
+    {
+      const bool inside = std::any_of(balls.begin(), balls.end(),
+        [&](const Ball& b) { return std::hypot(x - b.x, std::hypot(y - b.y, z - b.z)) < b.r; });
+      return inside == clear ? 1. : wall;
+    };
+  }
+  if (kind == 4) // shells with a hole
+  {
+    const double number = draw.uniform(3., 8.);
+    const double hole = draw.uniform(.02, .2);
+    name += "shells" + std::string(text);
+    return [=](double x, double y, double z)
+    {
+      const double r = std::hypot(x - .5, std::hypot(y - .5, z - .5));
+      const bool shell = std::fmod(number * 2. * r, 1.) < .2;
+      return shell && std::hypot(x - .5, y - .5) > hole ? wall : 1.;
+    };
+  }
+  // waves: log D smooth, or cut off
+  struct Wave
+  {
+    double k[3], phase, weight;
+  };
+  std::vector<Wave> waves(12);
+  for (Wave& wave : waves)
+  {
+    const double k = draw.logarithmic(4., 60.);
+    double direction[3], norm = 0.;
+    for (double& c : direction)
+    {
+      c = draw.uniform(-1., 1.);
+      norm += c * c;
+    }
+    for (int d = 0; d < 3; ++d)
+    {
+      wave.k[d] = k * direction[d] / std::sqrt(norm + 1e-9);
+    }
+    wave.phase = draw.uniform(0., 6.28);
+    wave.weight = 1. / std::sqrt(k);
+  }
+  const bool cut = kind == 6;
+  name += (cut ? "islands" : "waves") + std::string(text);
+  return [=](double x, double y, double z)
+  {
+    double sum = 0., weights = 0.;
+    for (const Wave& w : waves)
+    {
+      sum += w.weight * std::sin(w.k[0] * x + w.k[1] * y + w.k[2] * z + w.phase);
+      weights += w.weight * w.weight;
+    }
+    const double t = sum / std::sqrt(2. * weights); // about -2 .. 2
+    return cut ? (t > 0. ? 1. : wall) : std::pow(wall, 1. - Smoothstep(-1.5, 1.5, t));
+  };
+}
+
+Image RandomProcedural(Draw draw, int n, std::string& name)
+{
+  std::array<int, 3> dims;
+  std::array<double, 3> spacing{ { 1., 1., 1. } };
+  const bool stretched = draw.chance(.4);
+  double smallest = 1.;
+  for (std::size_t d = 0; d < 3; ++d)
+  {
+    dims[d] = draw.integer(n / 2, n + n / 4);
+    spacing[d] = stretched ? draw.logarithmic(.4, 3.) : 1.;
+    smallest = d ? std::min(smallest, spacing[d]) : spacing[d];
+  }
+  const Function shape = RandomShape(draw, name);
+  Image medium;
+  if (draw.chance(.3)) // scalars, with noise, and a mapping by their gradient
+  {
+    const double noise = draw.uniform(0., 6.);
+    Image scalars = MakeImage(dims, spacing);
+    scalars->GetPointData()->SetScalars(Sample(scalars, "S",
+      [&](double x, double y, double z)
+      { return 40. * -std::log10(shape(x, y, z)) + draw.uniform(-noise, noise); }));
+    const double rest = draw.logarithmic(1e-4, .2);
+    const double floor = draw.logarithmic(1e-6, 1e-3);
+    const bool albedo = draw.chance(.6);
+    const double reach = draw.chance(.5) ? draw.logarithmic(5., 100.) : 0.;
+    medium = Mapped(scalars,
+      [&](vtkOpticalMediumFilter* f)
+      {
+        f->SetDiffusionMappingToFromScalarGradient();
+        f->SetBetaFloor(floor);
+        f->SetReach(reach);
+        if (albedo)
+        {
+          f->SetAbsorptionMappingToFromAlbedo();
+          f->SetAlbedo(1. - rest);
+        }
+      });
+    name += ", by its gradient";
+  }
+  else
+  {
+    const std::function<double(double)> absorption = RandomAbsorption(draw, smallest, name);
+    medium = Medium(
+      dims, spacing, [&](double x, double y, double z) { return smallest * shape(x, y, z); },
+      absorption);
+  }
+  Image image = WithSeeds(medium, RandomLights(draw, medium, name));
+  char text[96];
+  std::snprintf(text, sizeof text, ", %d %d %d", dims[0], dims[1], dims[2]);
+  name += text;
+  if (stretched)
+  {
+    std::snprintf(text, sizeof text, " of %.2g %.2g %.2g", spacing[0], spacing[1], spacing[2]);
+    name += text;
+  }
+  return image;
+}
+
+#ifdef BENCH_WITH_READERS
+Image RandomReal(Draw draw, int most, const std::string& path, std::string& name)
+{
+  double at[3];
+  for (double& part : at)
+  {
+    part = draw.uniform(.2, .8);
+  }
+  Image image = Read(path, draw.integer(most / 2, most), nullptr, at);
+  if (!image)
+  {
+    return nullptr;
+  }
+  vtkDataArray* scalars = image->GetPointData()->GetScalars();
+  std::vector<double> values(static_cast<std::size_t>(scalars->GetNumberOfTuples()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    values[i] = scalars->GetComponent(static_cast<vtkIdType>(i), 0);
+  }
+  std::sort(values.begin(), values.end());
+  const auto percentile = [&](double part)
+  { return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))]; };
+  const double middle = percentile(draw.uniform(.2, .9));
+  const double width =
+    std::max(1e-3, draw.uniform(.02, .3) * (percentile(.995) - percentile(.005)));
+  const bool dark = draw.chance(.3); // dark matter is the clear one
+  const bool window = draw.chance(.5);
+  const bool albedo = draw.chance(.5);
+  const double rest = draw.logarithmic(1e-4, .2);
+  const double reach = draw.chance(.6) ? draw.logarithmic(8., 150.) : 0.;
+  const double floor = draw.logarithmic(1e-6, 1e-3);
+  const double sharper = draw.logarithmic(.5, 2.);
+  vtkNew<vtkPiecewiseFunction> function;
+  function->AddPoint(middle - .5 * width, dark ? 1. : 0.);
+  function->AddPoint(middle + .5 * width, dark ? 0. : 1.);
+  Image medium = Mapped(image,
+    [&](vtkOpticalMediumFilter* f)
+    {
+      f->SetBetaFloor(floor);
+      f->SetReach(reach);
+      if (window)
+      {
+        f->SetDiffusionMappingToFromTransferFunction();
+        f->SetDiffusionFunction(function);
+      }
+      else
+      {
+        f->SetDiffusionMappingToFromScalarGradient();
+        f->Update();
+        f->SetGradientScale(sharper * f->GetComputedGradientScale());
+      }
+      if (albedo)
+      {
+        f->SetAbsorptionMappingToFromAlbedo();
+        f->SetAlbedo(1. - rest);
+      }
+    });
+  char text[96];
+  if (window)
+  {
+    std::snprintf(
+      text, sizeof text, ", window %.3g +- %.2g%s", middle, .5 * width, dark ? " dark" : "");
+  }
+  else
+  {
+    std::snprintf(text, sizeof text, ", gradient x %.2g", sharper);
+  }
+  name += text;
+  if (albedo)
+  {
+    std::snprintf(text, sizeof text, ", albedo 1 - %.1g", rest);
+    name += text;
+  }
+  if (reach > 0.)
+  {
+    std::snprintf(text, sizeof text, ", reach %.2g", reach);
+    name += text;
+  }
+  return WithSeeds(medium, RandomLights(draw, medium, name));
+}
+#endif
+} // namespace
+
+std::vector<Scene> RandomScenes(unsigned seed, int n, int most, const std::string& data)
+{
+  std::vector<Scene> scenes;
+  Draw seeds(seed);
+  const auto next = [&] { return static_cast<unsigned>(seeds.uniform(0., 4e9)); };
+  const auto add = [&](const std::string& what, bool real, const Scene::Make& make)
+  {
+    // most images end as the filter's default has it
+    const int boundary = seeds.chance(.7) ? 0 : seeds.integer(1, 2);
+    const char* const ends[] = { "", "mirrors ", "black borders " };
+    scenes.push_back({ std::to_string(seed) + "." + std::to_string(scenes.size() + 1) + " " +
+        ends[boundary] + what,
+      real, make, boundary });
+  };
+  for (int i = 0; i < 24; ++i)
+  {
+    const Draw draw(next());
+    add("", false, [=](std::string& name) { return RandomProcedural(draw, n, name); });
+  }
+#ifdef BENCH_WITH_READERS
+  const std::string templates = "/usr/share/mricron/templates/";
+  const std::pair<const char*, std::string> files[] = { { "thorax_ct", data + "/thorax_ct.vti" },
+    { "ct_avm", data + "/ct_avm.nii.gz" }, { "mr_head", data + "/mr_head.nii.gz" },
+    { "engine", data + "/engine.nii.gz" }, { "bonsai", data + "/bonsai.nii.gz" },
+    { "f3", data + "/f3_crop.sgy" }, { "volve", data + "/volve_velocity.sgy" },
+    { "ch2better", templates + "ch2better.nii.gz" }, { "ch2", templates + "ch2.nii.gz" },
+    { "inia19", templates + "inia19-t1-brain.nii.gz" } };
+  for (int i = 0; i < 16; ++i)
+  {
+    const auto& file = files[static_cast<std::size_t>(i) % std::size(files)];
+    const Draw draw(next());
+    const std::string path = file.second;
+    add(file.first, true, [=](std::string& name) { return RandomReal(draw, most, path, name); });
   }
 #else
   (void)data, (void)most;

@@ -24,14 +24,24 @@ struct Seed
 
 struct Scene
 {
+  /** May add to the name. Null where the file of a real scene is not there. */
+  using Make = std::function<vtkSmartPointer<vtkImageData>(std::string& name)>;
   std::string name;
   bool real = false;
-  /** Null where the file of a real scene is not there. */
-  std::function<vtkSmartPointer<vtkImageData>()> make;
+  Make make;
+  int boundary = 0; ///< of vtkLightDiffusionFilter
 };
 
-/** All of them; procedural ones have about n^3 voxels, real ones at most `most` per axis. */
+/**
+ * The scenes that the estimate of the error was tuned on; procedural ones have about n^3 voxels,
+ * real ones at most `most` per axis.
+ */
 std::vector<Scene> Scenes(int n, int most, const std::string& data);
+/**
+ * 24 procedural scenes and 16 real ones, all drawn at random: shape, size, spacing, mapping,
+ * contrast, absorption, border, crop and lights. Each seed is another set, unseen until judged.
+ */
+std::vector<Scene> RandomScenes(unsigned seed, int n, int most, const std::string& data);
 
 /** `medium` (DiffusionCoefficient, Absorption) with the seeds' Source. */
 vtkSmartPointer<vtkImageData> WithSeeds(vtkImageData* medium, const std::vector<Seed>& seeds);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
 /** Only what the scene requires: active regions, named errors, budgets, cancelling. */
+#include "Core/SlowError.h"
 #include "DiffusionScene.h"
 #include "LightTransportTesting.h"
 #include "ThreadedFor.h"
@@ -175,6 +176,55 @@ void targetError(Suite& suite)
   LT_CHECK(suite, near >= 0.9 * all);
 }
 
+/** What a preconditioner does not see of an error, told from conjugate gradients' own numbers. */
+void slowComponents(Suite& suite)
+{
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1., 1.);
+  std::cout << "seed 7\n";
+  // the part of the slow components in the error, their eigenvalue of B A
+  const double kinds[4][2] = { { 0., 1. }, { .3, .1 }, { .3, .02 }, { 1., .05 } };
+  for (const auto& kind : kinds)
+  {
+    // B A is diagonal: most eigenvalues are near 1, a tenth of them near theta
+    std::vector<double> lambda(400), e(400), z(400), p(400, 0.);
+    for (std::size_t i = 0; i < e.size(); ++i)
+    {
+      const bool slow = i % 10 == 0;
+      lambda[i] = (slow ? kind[1] : 1.) * (1. + .1 * uniform(random));
+      e[i] = uniform(random) * (slow ? 3. : 1.) * (slow ? kind[0] : 1.);
+    }
+    SlowError told;
+    double most = 1.;
+    for (int k = 0; k < 8; ++k)
+    {
+      double rz = 0., energy = 0., before = 0.;
+      for (std::size_t i = 0; i < e.size(); ++i)
+      {
+        before += z[i] * z[i];
+        z[i] = lambda[i] * e[i];
+        rz += z[i] * z[i];
+      }
+      const double factor = told.factor(rz);
+      most = std::max(most, factor);
+      LT_CHECK(suite, factor >= 1. && factor < 1.3 / kind[1]); // no component is slower
+      for (std::size_t i = 0; i < e.size(); ++i)
+      {
+        p[i] = z[i] + (k ? rz / before * p[i] : 0.);
+        energy += p[i] * lambda[i] * p[i];
+      }
+      const double alpha = rz / energy;
+      for (std::size_t i = 0; i < e.size(); ++i)
+      {
+        e[i] -= alpha * p[i];
+      }
+      told.add(alpha, rz, k == 0);
+    }
+    std::cout << "slow part " << kind[0] << " of " << kind[1] << ": " << most << "\n";
+    LT_CHECK(suite, kind[1] == 1. || most > 1.8);
+  }
+}
+
 void budget(Suite& suite)
 {
   DiffusionScene scene = tube(48, 1e-6);
@@ -244,6 +294,7 @@ int main(int argc, char* argv[])
   }
   activeRegion(suite);
   targetError(suite);
+  slowComponents(suite);
   budget(suite);
   return suite.result();
 }

@@ -579,14 +579,13 @@ void coarser(Suite& suite)
   coarse->SetTargetError(0.01);
   coarse->ContinueOn();
   coarse->Update();
-  LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 2);
+  LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 1);
   LT_CHECK_CLOSE(suite, fluenceAt(coarse, 20, 15, 18), fluenceAt(full, 20, 15, 18), 0.01);
-  const int cold = coarse->GetNumberOfIterationsUsed();
   addArray<vtkFloatArray>(
     image, "Source", [](int i, int j, int k) { return i == 13 && j == 15 && k == 16 ? 1. : 0.; });
   coarse->Update();
   full->Update();
-  LT_CHECK(suite, coarse->GetNumberOfIterationsUsed() <= cold);
+  LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 2); // from the last state
   LT_CHECK_CLOSE(suite, fluenceAt(coarse, 20, 15, 18), fluenceAt(full, 20, 15, 18), 0.01);
   // another medium: nothing of the last one is left
   addArray<vtkFloatArray>(image, "DiffusionCoefficient", [](int, int, int) { return 0.5; });
@@ -594,6 +593,9 @@ void coarser(Suite& suite)
   full->Update();
   LT_CHECK_CLOSE(suite, fluenceAt(coarse, 30, 15, 18), fluenceAt(full, 30, 15, 18), 0.01);
   // what cells of two points cannot reach is gone on with on the full grid
+  addArray<vtkFloatArray>(
+    image, "Source", [](int i, int j, int k) { return i == 14 && j == 15 && k == 16 ? 1. : 0.; });
+  full->Update();
   coarse->SetTargetError(1e-12);
   coarse->Update();
   LT_CHECK(suite, coarse->GetUsedCoarseningFactor() == 1);
