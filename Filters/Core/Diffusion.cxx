@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Diffusion.h"
 
+#include "Core/ActiveRegion.h"
 #include "Core/Kernel.h"
 #include "Core/SlowError.h"
 
@@ -21,6 +22,13 @@ namespace
 {
 /** A sink at or below this (relative to the largest diagonal) is none. */
 constexpr float NoSink = 1e-30f;
+
+/**
+ * An active region may have so many voxels before it is solved on for the first time, but no
+ * larger a part of the volume: what light that fills it costs more.
+ */
+constexpr std::int64_t FirstRegion = 32768;
+constexpr std::int64_t FirstPart = 128;
 
 /** From this tolerance on, memory counts more than the last few per cent of speed. */
 constexpr double FrugalTolerance = 1e-4;
@@ -536,7 +544,8 @@ template <class T>
 DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
 {
   DiffusionReport report;
-  this->box = medium.grid;
+  this->volume = this->box = medium.grid;
+  this->corner = { { 0, 0, 0 } };
   this->shift = 0.;
   this->sinkWithoutShift.release();
   this->multigrid.release();
@@ -918,7 +927,8 @@ void DiffusionSolver::setOperator(const Grid& grid, DiffusionOperator&& op, doub
   this->isConstant = false;
   this->shift = 0.;
   this->sinkWithoutShift.release();
-  this->box = grid;
+  this->volume = this->box = grid;
+  this->corner = { { 0, 0, 0 } };
   this->scale = operatorScale;
   this->A = std::move(op);
   this->floatMedium = DiffusionMedium<float>(); // the residual is that of this operator
@@ -2005,6 +2015,123 @@ DiffusionReport DiffusionSolver::solveSteady(
 }
 
 //------------------------------------------------------------------------------
+template <class T>
+DiffusionMedium<T> DiffusionSolver::cut(const DiffusionMedium<T>& medium, std::vector<Span>& spans)
+{
+  const std::array<int, 3>& n = this->volume.dims;
+  // at even corners, so that cells of the first coarse grid are whole; and no farther out, since
+  // the coarser ones do worse where they begin with cells that are partly outside
+  constexpr int step = 2;
+  int low[3] = { n[0], n[1], n[2] };
+  int high[3] = { 0, 0, 0 };
+  for (std::size_t r = 0; r < spans.size(); ++r)
+  {
+    if (spans[r].begin < spans[r].end)
+    {
+      const int j = static_cast<int>(r % static_cast<std::size_t>(n[1]));
+      const int k = static_cast<int>(r / static_cast<std::size_t>(n[1]));
+      low[0] = std::min(low[0], spans[r].begin);
+      high[0] = std::max(high[0], spans[r].end);
+      low[1] = std::min(low[1], j);
+      high[1] = std::max(high[1], j + 1);
+      low[2] = std::min(low[2], k);
+      high[2] = std::max(high[2], k + 1);
+    }
+  }
+  // with a voxel around the region, where the volume goes on
+  this->box = this->volume;
+  for (int d = 0; d < 3; ++d)
+  {
+    this->corner[d] = std::max(0, low[d] - 1) / step * step;
+    this->box.dims[d] = std::min(n[d], high[d] + 1) - this->corner[d];
+  }
+  const std::array<int, 3>& m = this->box.dims;
+  std::vector<Span> inside(static_cast<std::size_t>(this->rows()));
+  for (std::size_t r = 0; r < inside.size(); ++r)
+  {
+    const std::int64_t j = static_cast<std::int64_t>(r) % m[1] + this->corner[1];
+    const std::int64_t k = static_cast<std::int64_t>(r) / m[1] + this->corner[2];
+    const Span& whole = spans[static_cast<std::size_t>(j + k * n[1])];
+    if (whole.begin < whole.end)
+    {
+      inside[r] = { whole.begin - this->corner[0], whole.end - this->corner[0] };
+    }
+  }
+  // the medium, of the region and of the voxels around it
+  auto& piece = std::get<Piece<T>&>(std::tie(this->floatPiece, this->doublePiece));
+  const std::int64_t size = this->box.size();
+  piece.D.allocate(size, Pages::Small);
+  piece.sigma_a.allocate(medium.sigma_a ? size : 0, Pages::Small);
+  piece.outside.allocate(medium.outside ? size : 0, Pages::Small);
+  ForRows(this->parallelFor, this->rows(), size,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        Span span{ m[0], 0 };
+        const int at[2] = { static_cast<int>(r % m[1]), static_cast<int>(r / m[1]) };
+        const auto join = [&](int j, int k, int more)
+        {
+          if (j >= 0 && j < m[1] && k >= 0 && k < m[2])
+          {
+            const Span& other =
+              inside[static_cast<std::size_t>(j + static_cast<std::int64_t>(m[1]) * k)];
+            if (other.begin < other.end)
+            {
+              span.begin = std::min(span.begin, std::max(0, other.begin - more));
+              span.end = std::max(span.end, std::min(m[0], other.end + more));
+            }
+          }
+        };
+        join(at[0], at[1], 1);
+        join(at[0] - 1, at[1], 0);
+        join(at[0] + 1, at[1], 0);
+        join(at[0], at[1] - 1, 0);
+        join(at[0], at[1] + 1, 0);
+        if (span.begin >= span.end)
+        {
+          continue;
+        }
+        const std::int64_t from = this->volume.index(
+          span.begin + this->corner[0], at[0] + this->corner[1], at[1] + this->corner[2]);
+        const std::int64_t to = span.begin + r * m[0];
+        const std::int64_t length = span.end - span.begin;
+        std::copy(medium.D + from, medium.D + from + length, piece.D.data() + to);
+        if (medium.sigma_a)
+        {
+          std::copy(
+            medium.sigma_a + from, medium.sigma_a + from + length, piece.sigma_a.data() + to);
+        }
+        if (medium.outside)
+        {
+          std::copy(
+            medium.outside + from, medium.outside + from + length, piece.outside.data() + to);
+        }
+      }
+    });
+  DiffusionMedium<T> part = medium;
+  part.grid = this->box;
+  part.D = piece.D.data();
+  part.sigma_a = medium.sigma_a ? piece.sigma_a.data() : nullptr;
+  part.outside = medium.outside ? piece.outside.data() : nullptr;
+  spans = std::move(inside);
+  return part;
+}
+
+template <class Action>
+void DiffusionSolver::forRegion(const Action& action) const
+{
+  ForEachRow(this->A, this->parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    {
+      const std::array<int, 3>& m = this->box.dims;
+      const int i = static_cast<int>(o - row * m[0]) + this->corner[0];
+      const int j = static_cast<int>(row % m[1]) + this->corner[1];
+      const int k = static_cast<int>(row / m[1]) + this->corner[2];
+      action(this->volume.index(i, j, k), o, n);
+    });
+}
+
 template <class T, class Q>
 DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, const Q* q,
   double* phi, const DiffusionControl& control, double threshold)
@@ -2015,9 +2142,10 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
   {
     return report;
   }
-  const std::array<int, 3>& n = this->box.dims;
-  const std::int64_t size = this->box.size();
-  std::fill(phi, phi + size, 0.);
+  const std::int64_t size = this->volume.size();
+  // A field to start from is none of this solve's.
+  ForRows(this->parallelFor, size, size,
+    [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
   if (this->isConstant)
   {
     this->describe(medium); // solved at once: no part of it costs less
@@ -2025,198 +2153,161 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
     report.seconds = now() - began;
     return report;
   }
-  constexpr int edge = 8; // of a tile, as OpenVDB's leaves
-  const std::array<int, 3> tiles{ { (n[0] + edge - 1) / edge, (n[1] + edge - 1) / edge,
-    (n[2] + edge - 1) / edge } };
-  const auto tileAt = [&](int i, int j, int k) {
-    return static_cast<std::size_t>(i + tiles[0] * (j + static_cast<std::int64_t>(tiles[1]) * k));
-  };
-  std::vector<std::uint8_t> active(tileAt(0, 0, tiles[2]), 0);
-  const auto grow = [&](const std::vector<std::uint8_t>& from)
+  if (control.targetError > 0.)
   {
-    for (int k = 0; k < tiles[2]; ++k)
-    {
-      for (int j = 0; j < tiles[1]; ++j)
-      {
-        for (int i = 0; i < tiles[0]; ++i)
-        {
-          if (from[tileAt(i, j, k)])
-          {
-            for (int c = std::max(0, k - 1); c <= std::min(tiles[2] - 1, k + 1); ++c)
-            {
-              for (int b = std::max(0, j - 1); b <= std::min(tiles[1] - 1, j + 1); ++b)
-              {
-                for (int a = std::max(0, i - 1); a <= std::min(tiles[0] - 1, i + 1); ++a)
-                {
-                  active[tileAt(a, b, c)] = 1;
-                }
-              }
-            }
-          }
-        }
-      }
-    }
-  };
-  // the tiles with sources, and those around them
-  {
-    std::vector<std::uint8_t> sources(active.size(), 0);
-    for (std::int64_t r = 0; r < this->rows(); ++r)
-    {
-      for (int i = 0; i < n[0]; ++i)
-      {
-        if (q[i + r * n[0]] != Q(0))
-        {
-          sources[tileAt(
-            i / edge, static_cast<int>(r % n[1]) / edge, static_cast<int>(r / n[1]) / edge)] = 1;
-        }
-      }
-    }
-    grow(sources);
+    threshold = std::min(threshold, 1e-6 * std::sqrt(control.targetError));
   }
 
-  DiffusionControl rough;
-  rough.tolerance = std::max(control.tolerance, 1e-4);
-  rough.maxIterations = 4;
-  rough.progress = control.progress;
-  double spent = 0.;
-  bool last = false; // the region holds: solve to the end
-  for (;;)
+  double spent = 0.; // applications, in parts of the volume's
+  int iterations = 0;
+  std::int64_t bytes = 0;
+  const double quarter = control.largestRegion * static_cast<double>(size);
+  const auto remaining = [&]
   {
-    // rows' spans: from the first to the last active tile
-    std::vector<Span> spans(static_cast<std::size_t>(this->rows()));
-    std::int64_t activeSize = 0;
-    for (std::int64_t r = 0; r < this->rows(); ++r)
-    {
-      const int j = static_cast<int>(r % n[1]) / edge;
-      const int k = static_cast<int>(r / n[1]) / edge;
-      Span& span = spans[static_cast<std::size_t>(r)];
-      for (int i = 0; i < tiles[0]; ++i)
-      {
-        if (active[tileAt(i, j, k)])
-        {
-          span.begin = span.end == 0 ? i * edge : span.begin;
-          span.end = std::min(n[0], (i + 1) * edge);
-        }
-      }
-      activeSize += span.end - span.begin;
-    }
     DiffusionControl rest = control;
     if (control.timeBudget > 0.)
     {
       rest.timeBudget = std::max(1e-6, control.timeBudget - (now() - began));
-      last = last || now() - began > 0.5 * control.timeBudget;
     }
-    // Light that fills the volume is better solved on the volume.
-    if (4 * activeSize > size)
+    return rest;
+  };
+  const auto finish = [&](double fraction)
+  {
+    report.activeFraction = fraction;
+    report.iterations = iterations;
+    report.fineApplications = spent;
+    report.bytes = std::max(bytes, report.bytes);
+    report.seconds = now() - began;
+    return report;
+  };
+  // Light that fills the volume is better solved for on the volume.
+  const auto wholeVolume = [&](bool asked = false)
+  {
+    if (control.regionOrNothing && !asked)
     {
-      this->assemble(medium, {});
-      const int before = report.iterations;
-      const double applications = report.fineApplications;
-      report = this->solveSteady(q, phi, rest);
-      report.iterations += before;
-      report.fineApplications += applications;
-      break;
+      std::fill(phi, phi + size, 0.);
+      report.reason = StopReason::MaxIterations;
+      report.message = "light fills the volume";
+      return finish(1.);
     }
-    this->assemble(medium, std::move(spans));
+    this->box = this->volume;
+    this->corner = { { 0, 0, 0 } };
+    this->assemble(medium, {});
+    report = this->solveSteady(q, phi, remaining());
+    iterations += report.iterations;
+    spent += report.fineApplications;
+    return finish(1.);
+  };
+
+  // 1. where light is likely to get
+  ActiveRegion<T> region(medium, threshold);
+  if (!region.start(q, this->parallelFor))
+  {
+    return wholeVolume();
+  }
+  const std::int64_t first = std::min(FirstRegion, std::max<std::int64_t>(1024, size / FirstPart));
+  bool complete = region.advance(first);
+  DiffusionControl rough;
+  rough.tolerance = std::max(control.tolerance, 1e-8);
+  rough.targetError = std::max(control.targetError, 0.3);
+  rough.maxIterations = std::min(control.maxIterations, 20);
+  if (control.progress)
+  {
+    rough.progress = [&control](double) { return control.progress(0.); };
+  }
+  Buffer<Q> source;
+  Buffer<double> field;
+  bool rebuild = true;
+  for (int round = 0;; ++round)
+  {
+    std::int64_t active = region.size();
+    if (active == 0)
+    {
+      return wholeVolume(true); // no light
+    }
+    if (static_cast<double>(active) > quarter)
+    {
+      return wholeVolume();
+    }
+    // 2. solve there: roughly, until the region is known
+    if (rebuild)
+    {
+      std::vector<Span> spans = region.spans();
+      const DiffusionMedium<T> part = this->cut(medium, spans);
+      this->assemble(part, std::move(spans));
+      source.allocate(this->box.size(), Pages::Small);
+      field.allocate(this->box.size(), Pages::Small);
+      this->forRegion(
+        [&](std::int64_t from, std::int64_t to, int n)
+        {
+          std::copy(q + from, q + from + n, source.data() + to);
+          std::copy(phi + from, phi + from + n, field.data() + to);
+        });
+      const std::int64_t nx = this->volume.dims[0];
+      const std::vector<Span> domain = region.domain();
+      for (std::size_t r = 0; r < domain.size(); ++r)
+      {
+        const Span& last = domain[r];
+        double* row = phi + static_cast<std::int64_t>(r) * nx;
+        std::fill(row + last.begin, row + last.end, 0.);
+      }
+    }
     if (!this->anySink)
     {
-      active.assign(active.size(), 1); // nowhere to go: the whole volume tells
-      continue;
+      return wholeVolume(); // nowhere to go: the whole volume tells
     }
-    const RightHandSide<Q> b{ q, 1. / this->scale, false };
-    report.leaked = 0.;
-    this->conjugateGradients(b, phi, last ? rest : rough, 0., last ? 1. : 0., report);
-    spent += report.fineApplications * static_cast<double>(activeSize) / static_cast<double>(size);
-    report.fineApplications = 0.;
+    const auto publish = [&](const double* reached)
+    {
+      this->forRegion([&](std::int64_t to, std::int64_t from, int n)
+        { std::copy(reached + from, reached + from + n, phi + to); });
+    };
+    const bool late = control.timeBudget > 0. && now() - began > 0.5 * control.timeBudget;
+    DiffusionControl how = complete || late ? remaining() : rough;
+    if (control.intermediate)
+    {
+      how.intermediateInterval = control.intermediateInterval;
+      how.intermediate = [&](const double* reached)
+      {
+        publish(reached);
+        control.intermediate(phi);
+      };
+    }
+    report = this->solveSteady(source.data(), field.data(), how);
+    active = this->A.activeSize;
+    iterations += report.iterations;
+    spent += report.fineApplications * static_cast<double>(active) / static_cast<double>(size);
+    bytes = std::max(bytes,
+      report.bytes +
+        active *
+          static_cast<std::int64_t>(
+            2 * sizeof(T) + sizeof(Q) + sizeof(double) + sizeof(float) + 1));
+    const double fraction = static_cast<double>(active) / static_cast<double>(size);
+    if (report.reason == StopReason::NoSteadyState)
+    {
+      return wholeVolume();
+    }
+    publish(field.data());
     if (report.reason != StopReason::Converged && report.reason != StopReason::MaxIterations)
     {
-      break;
+      return finish(fraction);
     }
-    // what stands at the region's border
-    double largest = 0.;
-    for (std::int64_t t = 0; t < this->A.numberOfRows(); ++t)
+    // 3. what stands at its rim
+    const auto rim = region.learn(phi, round < 3); // then it only grows: there is an end
+    report.leaked = rim.leaked;
+    if (rim.expected > quarter)
     {
-      const std::int64_t r = this->A.row(t);
-      const Span span = this->A.span(r);
-      for (std::int64_t i = r * n[0] + span.begin; i < r * n[0] + span.end; ++i)
-      {
-        largest = std::max(largest, std::abs(phi[i]));
-      }
+      return wholeVolume();
     }
-    bool any = false;
-    double leaked = 0.;
-    // of the border's open faces: all, the bright ones
-    std::int64_t faces = 0;
-    std::int64_t bright = 0;
-    const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
-    const auto D = [&](std::int64_t i)
-    { return medium.outside && medium.outside[i] ? T(0) : medium.D[i]; };
-    for (std::int64_t t = 0; t < this->A.numberOfRows(); ++t)
+    const std::int64_t before = region.size();
+    const bool ended = region.advance(std::max(first, 2 * region.lit()));
+    if ((complete && !region.grown()) || late)
     {
-      const std::int64_t r = this->A.row(t);
-      const Span span = this->A.span(r);
-      int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-      // inside a row, a border is at its ends or where a neighbouring row does not follow
-      for (at[0] = span.begin; at[0] < span.end; ++at[0])
-      {
-        for (int d = 0; d < 3; ++d)
-        {
-          for (int side = -1; side <= 1; side += 2)
-          {
-            if (at[d] + side < 0 || at[d] + side >= n[d] || this->isActive(d, at, side))
-            {
-              continue;
-            }
-            const std::int64_t i = at[0] + r * n[0];
-            const double g = harmonicMean(D(i), D(i + side * stride[d])) /
-              (this->box.spacing[d] * this->box.spacing[d]);
-            leaked += g * phi[i];
-            faces += g > 0.;
-            bright += g > 0. && std::abs(phi[i]) > std::sqrt(threshold) * largest;
-            // what would stand beyond, were nothing lost there
-            if (g > 0. && std::abs(phi[i]) > threshold * largest)
-            {
-              // the next tile on this side, and the one behind it: fewer rounds
-              for (int ahead = 1; ahead <= 2; ++ahead)
-              {
-                int tile[3] = { at[0] / edge, at[1] / edge, at[2] / edge };
-                tile[d] += side * ahead;
-                if (tile[d] >= 0 && tile[d] < tiles[d])
-                {
-                  active[tileAt(tile[0], tile[1], tile[2])] = 1;
-                }
-              }
-              any = true;
-            }
-          }
-        }
-      }
+      return finish(fraction);
     }
-    report.leaked = leaked * this->box.voxelVolume();
-    // Bright all around: it will not end before the volume does.
-    if (2 * bright > faces)
-    {
-      active.assign(active.size(), 1);
-    }
-    if (any && !(control.timeBudget > 0. && last))
-    {
-      last = false;
-    }
-    else if (last)
-    {
-      this->balance(q, phi, report);
-      break;
-    }
-    else
-    {
-      last = true;
-    }
+    // rows of the last operator do for a region that is hardly smaller
+    rebuild = region.grown() || 4 * before < 3 * active;
+    complete = ended || !region.grown();
   }
-  report.activeFraction =
-    static_cast<double>(this->A.activeSize) / static_cast<double>(std::max<std::int64_t>(size, 1));
-  report.fineApplications += spent;
-  report.seconds = now() - began;
-  return report;
 }
 
 //------------------------------------------------------------------------------
@@ -2432,50 +2523,51 @@ DiffusionReport DiffusionSolver::march(
 template <class T>
 void DiffusionSolver::flux(const double* phi, T* E) const
 {
+  const std::array<int, 3>& m = this->volume.dims;
+  const std::int64_t stride[3] = { 1, m[0], static_cast<std::int64_t>(m[0]) * m[1] };
   const std::array<int, 3>& n = this->box.dims;
-  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  const std::int64_t step[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   // g = D_f / (h^2 scale): the face's flux is g h scale (phi - phi_next).
   if (!this->A.spans.empty())
   {
-    std::fill(E, E + 3 * this->box.size(), T(0));
+    std::fill(E, E + 3 * this->volume.size(), T(0));
   }
-  ForRows(this->parallelFor, this->A.numberOfRows(), this->A.activeSize,
-    [&](std::int64_t begin, std::int64_t end)
+  this->forRegion(
+    [&](std::int64_t to, std::int64_t o, int length)
     {
-      for (std::int64_t t = begin; t < end; ++t)
+      const std::int64_t row = o / n[0];
+      int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+      for (int x = 0; x < length; ++x)
       {
-        const std::int64_t r = this->A.row(t);
-        const Span span = this->A.span(r);
-        int at[3] = { 0, static_cast<int>(r % n[1]), static_cast<int>(r / n[1]) };
-        for (at[0] = span.begin; at[0] < span.end; ++at[0])
+        // the voxel in the box and in the volume
+        const std::int64_t b = o + x;
+        const std::int64_t i = to + x;
+        at[0] = static_cast<int>(b % n[0]);
+        for (int d = 0; d < 3; ++d)
         {
-          const std::int64_t i = at[0] + r * n[0];
-          for (int d = 0; d < 3; ++d)
+          double low = 0.;
+          double high = 0.;
+          if (at[d] > 0)
           {
-            double low = 0.;
-            double high = 0.;
-            if (at[d] > 0)
-            {
-              low = this->face(d, i - stride[d]) * (phi[i - stride[d]] - phi[i]);
-            }
-            else if (!this->border[d][0].empty())
-            {
-              low = -static_cast<double>(
-                      this->border[d][0][static_cast<std::size_t>(this->borderIndex(d, at))]) *
-                phi[i];
-            }
-            if (at[d] + 1 < n[d])
-            {
-              high = this->face(d, i) * (phi[i] - phi[i + stride[d]]);
-            }
-            else if (!this->border[d][1].empty())
-            {
-              high = static_cast<double>(
-                       this->border[d][1][static_cast<std::size_t>(this->borderIndex(d, at))]) *
-                phi[i];
-            }
-            E[3 * i + d] = static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
+            low = this->face(d, b - step[d]) * (phi[i - stride[d]] - phi[i]);
           }
+          else if (!this->border[d][0].empty())
+          {
+            low = -static_cast<double>(
+                    this->border[d][0][static_cast<std::size_t>(this->borderIndex(d, at))]) *
+              phi[i];
+          }
+          if (at[d] + 1 < n[d])
+          {
+            high = this->face(d, b) * (phi[i] - phi[i + stride[d]]);
+          }
+          else if (!this->border[d][1].empty())
+          {
+            high = static_cast<double>(
+                     this->border[d][1][static_cast<std::size_t>(this->borderIndex(d, at))]) *
+              phi[i];
+          }
+          E[3 * i + d] = static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
         }
       }
     });

@@ -130,6 +130,14 @@ struct DiffusionControl
   double targetError = 0.;
   /** Where above 0, seconds after which the best answer so far is returned (MaxIterations). */
   double timeBudget = 0.;
+  /** Of solveActive: the largest part of the voxels that is solved for as a region, in (0, 1]. */
+  double largestRegion = 0.25;
+  /**
+   * Of solveActive: where the region would be larger, answer MaxIterations with an activeFraction
+   * of 1 and phi = 0 instead of solving on the whole volume: the caller knows another way. To find
+   * that out costs some per cent of a full solve.
+   */
+  bool regionOrNothing = false;
   /** Called with the field reached, after an iteration, at most once per interval (seconds). */
   std::function<void(const double* phi)> intermediate;
   double intermediateInterval = 0.1;
@@ -167,11 +175,12 @@ public:
   DiffusionReport solveSteady(const T* q, double* phi, const DiffusionControl& control);
 
   /**
-   * The steady state on an active region: tiles around the sources, grown where more than
-   * `threshold` (of the largest |phi|) stands at the region's border, with phi = 0
-   * beyond. Light that stays in a vessel then does not cost the whole volume; light that fills
-   * a quarter of it is solved on the whole. phi is out only. The operator that is kept is the
-   * region's: setMedium before another kind of solve.
+   * The steady state on an active region (see ActiveRegion.h): the voxels that light reaches from
+   * the sources, grown where more than `threshold` (of the largest |phi|) would stand beyond, with
+   * phi = 0 there. Light that stays in a vessel then does not cost the whole volume; light that
+   * fills more than control.largestRegion of it is solved on the whole. With a control.targetError
+   * e, at most 1e-6 sqrt(e) is cut off. phi is out only. The operator that is kept is the region's:
+   * setMedium before another kind of solve.
    */
   template <class T, class Q>
   DiffusionReport solveActive(const DiffusionMedium<T>& medium, const Q* q, double* phi,
@@ -209,7 +218,7 @@ public:
   template <class T>
   void flux(const double* phi, T* E) const;
 
-  const Grid& grid() const { return this->box; }
+  const Grid& grid() const { return this->volume; }
 
 private:
   friend class CoarseDiffusion;
@@ -232,6 +241,12 @@ private:
   template <class T>
   void computeRow(
     const DiffusionMedium<T>& medium, std::int64_t row, float* const g[3], float* s) const;
+  /** Makes the box the one around the spans, with the medium in it; returns the spans there. */
+  template <class T>
+  DiffusionMedium<T> cut(const DiffusionMedium<T>& medium, std::vector<Span>& spans);
+  /** action(from, to, n): for a row of the region, its n values in the volume and in the box. */
+  template <class Action>
+  void forRegion(const Action& action) const;
   /** Whether the voxel one step along axis d, inside the box, belongs to the active region. */
   bool isActive(int d, const int at[3], int step) const;
 
@@ -298,14 +313,25 @@ private:
   void estimateError(const double* phi, const float* z, double step, DiffusionReport& report) const;
 
   ParallelFor parallelFor;
-  Grid box;
-  DiffusionOperator A; // divided by `scale`, so that no diagonal is above 1
-  double scale = 1.;   // 1/length
+  Grid volume;                              ///< the medium's
+  Grid box;                                 ///< the operator's: of an active region, around it
+  std::array<int, 3> corner{ { 0, 0, 0 } }; ///< of the box in the volume
+  DiffusionOperator A;                      // divided by `scale`, so that no diagonal is above 1
+  double scale = 1.;                        // 1/length
   double largestDiagonal = 1.;
   double gershgorin = 1.; // bound of the largest eigenvalue, divided by scale
   /** The caller's arrays, one of the two: what the residual is recomputed from. */
   DiffusionMedium<float> floatMedium;
   DiffusionMedium<double> doubleMedium;
+  /** The medium in the box of an active region. */
+  template <class T>
+  struct Piece
+  {
+    Buffer<T> D, sigma_a;
+    Buffer<std::uint8_t> outside;
+  };
+  Piece<float> floatPiece;
+  Piece<double> doublePiece;
   double twoA = 0.; ///< of the Robin condition
   bool anySink = false;
   bool everySink = false;

@@ -70,7 +70,8 @@ void activeRegion(Suite& suite)
     LT_CHECK(suite, error < 1e-2);
     LT_CHECK_NEAR(
       suite, report.absorbed + report.escaped + report.leaked - report.emitted, 0., 1e-6);
-    LT_CHECK(suite, std::abs(report.leaked) < 1e-4);
+    // far below the error of the answer
+    LT_CHECK(suite, std::abs(report.leaked) < 1e-4 * std::abs(report.emitted));
     LT_CHECK(suite, report.bytes < whole.bytes / 2);
     // flux is defined everywhere
     std::vector<double> E(3 * active.phi.size(), 7.);
@@ -249,7 +250,7 @@ void budget(Suite& suite)
 /** Whatever the threads: the same field of a region, the same estimate, the same stop. */
 void threads(Suite& suite)
 {
-  const DiffusionScene scene = tube(64, 1e-4);
+  const DiffusionScene scene = tube(64, 1e-4, 11.);
   const auto solve = [&](const ParallelFor& parallelFor, bool active, std::vector<double>& phi)
   {
     phi = scene.phi;
@@ -258,6 +259,7 @@ void threads(Suite& suite)
     control.progress = [](double) { return true; };
     if (active)
     {
+      control.largestRegion = 0.6;
       return solver.solveActive(scene.medium(), scene.q.data(), phi.data(), control, 1e-3);
     }
     solver.setMedium(scene.medium());
