@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Surfaces that one sees through:
 
-transparent_surfaces.py [--data FOLDER] [--size N] [--only SCENE] FOLDER
+transparent_surfaces.py [--data FOLDER] [--size N] [--only SCENE] [--kind NAME] FOLDER
 
 For each scene a picture in FOLDER: constant opacity | shading by curvature | opacity by
 curvature, with the transfer functions below (opacity over |kappa| to the right and depth
@@ -53,6 +53,7 @@ arguments = argparse.ArgumentParser(description=__doc__)
 arguments.add_argument("--data", default="../shared/data")
 arguments.add_argument("--size", type=int, default=300)
 arguments.add_argument("--only", help="car, turbine-blade, cortex, head or lines")
+arguments.add_argument("--kind", help="another opacity function, such as WideDepth, for all")
 arguments.add_argument("folder")
 options = arguments.parse_args()
 
@@ -435,7 +436,7 @@ def picture_of(name, parts, camera, kind, scale=0.0, opacity=0.4, limits=(0.05, 
         style = the_pass.GetCurvatureOpacityProperty()
         style.SetCurvatureShading(i >= 1)
         style.SetCurvatureOpacity(i == 2)
-        style.GetOpacityFunction().SetKind(kind)
+        style.GetOpacityFunction().SetKind(getattr(Opacity, options.kind) if options.kind else kind)
         style.GetOpacityFunction().SetMinimumOpacity(limits[0])
         style.GetOpacityFunction().SetMaximumOpacity(limits[1])
         for actor in actors_of(parts, opacity):
@@ -500,7 +501,7 @@ def cortex_picture():
     cortex.Update()
     vessels = surface_of("ct_avm.nii.gz", 55.0, 0.8, (1.0, 1.0, 1.0), 400, (0, 104))
     vessels = fit(vessels, cortex.GetOutput().GetBounds(), 0.93)
-    camera = {"from": (-1.0, 0.25, 0.35), "up": (0.0, 0.0, 1.0), "zoom": 1.4}
+    camera = {"from": (-1.0, 0.25, 0.35), "up": (0.0, 0.0, 1.0), "zoom": 1.3}
     parts = [(cortex, (0.55, 0.62, 0.75)), (vessels, (0.85, 0.1, 0.08), True)]
     picture_of("cortex", parts, camera, Opacity.CurvatureOnly, 0.7, 0.3, (0.06, 0.5))
 
