@@ -23,14 +23,17 @@
 #include "vtkFloatArray.h"
 #include "vtkIdList.h"
 #include "vtkImageData.h"
+#include "vtkMath.h"
 #include "vtkNew.h"
 #include "vtkPLYReader.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkSMPTools.h"
 #include "vtkSmartPointer.h"
+#include "vtkTriangle.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -223,14 +226,38 @@ std::vector<double> roughness(vtkPolyData* mesh, vtkDataArray* mean, double edge
   return rough;
 }
 
+/** The integrals of K and of |K| over 4 pi: the former is 1 on what is closed as a sphere. */
+std::array<double, 2> totals(vtkPolyData* mesh, vtkDataArray* gaussian)
+{
+  std::array<double, 2> sums{ { 0., 0. } };
+  vtkNew<vtkIdList> points;
+  for (vtkIdType c = 0; c < mesh->GetNumberOfCells(); ++c)
+  {
+    mesh->GetCellPoints(c, points);
+    double corners[3][3];
+    for (int i = 0; i < 3; ++i)
+    {
+      mesh->GetPoint(points->GetId(i), corners[i]);
+    }
+    const double area = vtkTriangle::TriangleArea(corners[0], corners[1], corners[2]);
+    for (int i = 0; i < 3; ++i)
+    {
+      const double K = gaussian->GetComponent(points->GetId(i), 0);
+      sums[0] += area / 3. * K / (4. * vtkMath::Pi());
+      sums[1] += area / 3. * std::abs(K) / (4. * vtkMath::Pi());
+    }
+  }
+  return sums;
+}
+
 void meshes(const std::string& folder)
 {
   std::printf(
     "\nMeshes: time per point; |H| and its difference to the median of the points around, "
-    "both times the mean edge\n\n");
+    "both times the mean edge; the integrals of K and |K|\n\n");
   std::printf(
     "| mesh | points | filter | us/point | |H| 50, 90, 99 %% | largest | roughness 50, 90, "
-    "99 %% |\n|---|---|---|---|---|---|---|\n");
+    "99 %% | K / 4 pi | |K| / 4 pi |\n|---|---|---|---|---|---|---|---|---|\n");
   for (const char* name : { "bunny.ply", "turbineblade.ply", "cortex_left.ply" })
   {
     vtkNew<vtkPLYReader> reader;
@@ -289,12 +316,20 @@ void meshes(const std::string& folder)
         H.push_back(edge * std::abs(mean->GetComponent(i, 0)));
       }
       const std::vector<double> rough = roughness(mesh, mean, edge);
+      vtkNew<vtkCurvatures> stock;
+      stock->SetInputData(mesh);
+      stock->SetCurvatureTypeToGaussian();
+      stock->Update();
+      const std::array<double, 2> total = totals(mesh,
+        kind == 0 ? stock->GetOutput()->GetPointData()->GetArray("Gauss_Curvature")
+                  : output->GetPointData()->GetArray(vtkLightTransportArrays::GaussianCurvature));
       static const char* const names[3] = { "vtkCurvatures", "two rings", "radius 4 edges" };
-      std::printf("| %s | %lld | %s | %.2f | %.3f, %.3f, %.3f | %.3g | %.3f, %.3f, %.3f |\n", name,
-        static_cast<long long>(mesh->GetNumberOfPoints()), names[kind],
+      std::printf(
+        "| %s | %lld | %s | %.2f | %.3f, %.3f, %.3f | %.3g | %.3f, %.3f, %.3f | %.2f | %.0f |\n",
+        name, static_cast<long long>(mesh->GetNumberOfPoints()), names[kind],
         1e6 * seconds / double(mesh->GetNumberOfPoints()), quantile(H, .5), quantile(H, .9),
         quantile(H, .99), *std::max_element(H.begin(), H.end()), quantile(rough, .5),
-        quantile(rough, .9), quantile(rough, .99));
+        quantile(rough, .9), quantile(rough, .99), total[0], total[1]);
     }
   }
 }
