@@ -66,9 +66,7 @@ if not failures:
 
 # Every project that a user may build against the installation.
 projects = [os.path.join(a.source, "Testing", "House", "External")]
-minimal = os.path.join(a.source, "Examples", "Minimal")
-if os.path.isfile(os.path.join(minimal, "CMakeLists.txt")):
-    projects.append(minimal)
+projects += [os.path.join(a.source, "Examples", n) for n in ("Minimal", "CurvatureTransparency")]
 for project in projects:
     if failures:
         break
