@@ -41,6 +41,37 @@ namespace lighttransport
 namespace
 {
 constexpr GLuint EndOfList = 0xFFFFFFFFU;
+
+/**
+ * Macros for shaders: LT_ITEM of 0 to n - 1, and LT_EXCHANGE of the pairs of Batcher's
+ * odd-even merge sort (1968), for a power of 2.
+ */
+std::string sortingNetwork(int n)
+{
+  std::string each = "#define LT_EACH";
+  for (int i = 0; i < n; ++i)
+  {
+    each += " LT_ITEM(" + std::to_string(i) + ")";
+  }
+  std::string network = "\n#define LT_NETWORK";
+  for (int p = 1; p < n; p *= 2)
+  {
+    for (int k = p; k > 0; k /= 2)
+    {
+      for (int j = k % p; j + k < n; j += 2 * k)
+      {
+        for (int i = j; i < std::min(j + k, n - k); ++i)
+        {
+          if (i / (2 * p) == (i + k) / (2 * p))
+          {
+            network += " LT_EXCHANGE(" + std::to_string(i) + "," + std::to_string(i + k) + ")";
+          }
+        }
+      }
+    }
+  }
+  return each + network + "\n";
+}
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -162,7 +193,7 @@ int KBuffer::BitsPerFragment() const
 {
   const int list = 32 + 32 + (this->Now.floatColor ? 128 : 64); // next, depth, colour
   // shape, normal; then z, normal, node, bucket, neighbours
-  const int style = this->Now.style ? 32 + 32 + 32 + 32 + 32 + 64 + 32 : 0;
+  const int style = this->Now.style ? 32 + 32 + 32 + 32 + 32 + 32 + 32 : 0;
   return list + style + (this->Now.lines ? 128 + 128 : 0);
 }
 
@@ -213,7 +244,7 @@ void KBuffer::BindForReading(const Uniforms& uniforms)
          Reader{ &this->Pixels, "ltPixels", GL_RGBA32UI },
          Reader{ &this->Records, "ltRecords", GL_RG32UI },
          Reader{ &this->NodeList, "ltNodeList", GL_R32UI },
-         Reader{ &this->Buckets, "ltBuckets", GL_RG32UI },
+         Reader{ &this->Buckets, "ltBucketList", GL_R32UI },
          Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
          Reader{
            this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI } })
@@ -243,6 +274,7 @@ void KBuffer::FreeUnits()
 //------------------------------------------------------------------------------
 void KBuffer::SetGeometry(const Uniforms& uniforms) const
 {
+  uniforms.Set("ltRows", this->Rows);
   uniforms.Set("ltSize", std::array<int, 2>{ this->Now.size[0], this->Now.size[1] });
   uniforms.Set("ltParallel", this->Parallel);
   uniforms.Set("ltProjection", this->Projection);
@@ -535,10 +567,11 @@ vtkTypeInt64 KBuffer::EndGeometry()
 /** For rows low to high - 1; what went wrong, or empty. */
 std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
 {
+  this->Rows = { low, high };
   const vtkTypeInt64 listed = std::max<vtkTypeInt64>(nodes, 1);
   this->Records.Reserve(listed * 8);
   this->NodeList.Reserve(listed * 4);
-  this->Buckets.Reserve(listed * 8);
+  this->Buckets.Reserve(listed * 4);
   this->Neighbors.Reserve(listed * 4);
   this->Window->GetShaderCache()->ReleaseCurrentShader();
   for (StorageBuffer* buffer : { &this->Pixels, &this->Records, &this->NodeList, &this->Buckets,
@@ -547,7 +580,7 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
     buffer->Bind();
   }
   const std::string head = "#version 430 core\n" + this->Defines(this->Room()) +
-    define("LT_SINGLE_BUCKET", this->Now.singleBucket) + vtkBucketedKBufferRead +
+    sortingNetwork(this->Room()) + define("LT_SINGLE_BUCKET", this->Now.singleBucket) + vtkBucketedKBufferRead +
     vtkBucketedKBufferPixel;
   const auto run = [&](ComputeProgram& program, int stage, const std::string& body)
   {
@@ -557,8 +590,6 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
       const Uniforms uniforms(program);
       this->BindForReading(uniforms);
       this->SetGeometry(uniforms);
-      uniforms.Set("ltFirstRow", low);
-      uniforms.Set("ltLastRow", high);
       uniforms.Set("ltLayers", this->Now.layers);
       glDispatchCompute(
         static_cast<GLuint>((this->Now.size[0] + 63) / 64), static_cast<GLuint>(high - low), 1);
@@ -583,14 +614,14 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
     this->LatestTensors = &this->Tensors;
     this->Tensors.Bind();
     problem =
-      run(this->Tensor, 4, std::string(vtkBucketedKBufferCurvature) + vtkBucketedKBufferTensor);
+      run(this->Tensor, 4, define("LT_FIND", 1) + vtkBucketedKBufferCurvature + vtkBucketedKBufferTensor);
     for (int i = 0; i < this->Now.smoothing && problem.empty(); ++i)
     {
       StorageBuffer* next =
         this->LatestTensors == &this->Tensors ? &this->SmoothTensors : &this->Tensors;
       next->Bind();
       problem =
-        run(this->Smooth, 4, std::string(vtkBucketedKBufferCurvature) + vtkBucketedKBufferSmooth);
+        run(this->Smooth, 4, define("LT_FIND", 0) + vtkBucketedKBufferCurvature + vtkBucketedKBufferSmooth);
       this->LatestTensors = next;
     }
   }
@@ -610,11 +641,11 @@ bool KBuffer::Blend(int first, int last)
   if (!this->Quad || this->QuadKey != key)
   {
     const std::string body = this->Now.style
-      ? std::string(vtkBucketedKBufferPixel) + vtkBucketedKBufferCurvature +
+      ? std::string(vtkBucketedKBufferPixel) + define("LT_FIND", 1) + vtkBucketedKBufferCurvature +
         (this->Now.lines ? vtkBucketedKBufferLines : "") + vtkBucketedKBufferStyle
       : std::string(vtkBucketedKBufferList) + vtkBucketedKBufferBlend;
     const std::string source = std::string("//VTK::System::Dec\n") + vtkBucketedKBufferExtensions +
-      "//VTK::Output::Dec\n" + key + vtkBucketedKBufferRead + body;
+      "//VTK::Output::Dec\n" + key + sortingNetwork(this->Room()) + vtkBucketedKBufferRead + body;
     this->Quad =
       std::make_unique<vtkOpenGLQuadHelper>(this->Window, nullptr, source.c_str(), nullptr);
     this->QuadKey = key;

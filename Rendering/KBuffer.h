@@ -141,6 +141,7 @@ private:
   std::array<float, 4> Projection{};
   std::array<float, 2> DepthToVC{};
   std::array<float, 2> DepthRange{};
+  std::array<int, 2> Rows{}; // of the band
   float Footprint = 1.F;
 
   std::chrono::steady_clock::time_point LastMark;

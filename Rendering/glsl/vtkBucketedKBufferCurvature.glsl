@@ -3,7 +3,7 @@
 //
 // vtkBucketedKBufferPass: curvature of a surface at a fragment, from its neighbours
 // (as Vergne et al. 2009, but in VC lengths). Defined before:
-// vtkBucketedKBufferPixel.glsl.
+// vtkBucketedKBufferPixel.glsl; LT_FIND (1: neighbours are looked up), then LT_ROOM, LT_EACH.
 
 uniform float ltCurvatureScale; // s, a length
 uniform sampler2D ltParameters; // row: style; vtkCurvatureOpacityProperty::GetParameters
@@ -29,38 +29,86 @@ ltSurfacePoint ltPointAt(ivec2 p, uint place)
 
 const ivec2 ltSides[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
 
-// The first fragments of the pixels at ltSides.
-ivec4 ltFirstsAround(ivec2 p)
+ivec4 ltFirsts; // fragments of the pixels at ltSides
+
+#if LT_FIND
+// By the pixel's own i: i + 1 in the pixels on the left and below. The search looks right
+// and up only.
+uint ltLeft[LT_ROOM];
+uint ltBelow[LT_ROOM];
+#endif
+
+void ltLookAround(ivec2 p)
 {
-  ivec4 firsts;
+#if LT_FIND
+#define LT_ITEM(i) ltLeft[i] = ltBelow[i] = 0u;
+  LT_EACH
+#undef LT_ITEM
+#endif
+  uvec2 pixels[4];
   for (int side = 0; side < 4; ++side)
   {
-    ivec2 q = clamp(p + ltSides[side], ivec2(0), ltSize - 1);
-    firsts[side] = int(texelFetch(ltPixels, q.y * ltSize.x + q.x).x);
+    ivec2 q = clamp(p + ltSides[side], ivec2(0, ltRows.x), ivec2(ltSize.x, ltRows.y) - 1);
+    pixels[side] = texelFetch(ltPixels, q.y * ltSize.x + q.x).xy;
+    ltFirsts[side] = int(pixels[side].x);
   }
-  return firsts;
+#if LT_FIND
+  uint j = 0u;
+  uint count = p.x > 0 ? uint(ltFragments(pixels[2])) : 0u;
+  while (j < count)
+  {
+    uint right = texelFetch(ltNeighbors, ltFirsts[2] + int(j)).x & 255u;
+    ++j;
+    if (right > 0u)
+    {
+      ltLeft[right - 1u] = j;
+    }
+  }
+  j = 0u;
+  count = p.y > ltRows.x ? uint(ltFragments(pixels[3])) : 0u;
+  while (j < count)
+  {
+    uint up = (texelFetch(ltNeighbors, ltFirsts[3] + int(j)).x >> 8u) & 255u;
+    ++j;
+    if (up > 0u)
+    {
+      ltBelow[up - 1u] = j;
+    }
+  }
+#endif
+}
+
+#if LT_FIND
+// i + 1 of the neighbours: right | up << 8 | left << 16 | below << 24; 0: missing.
+uint ltNeighborsOf(uint first, uint i)
+{
+  return texelFetch(ltNeighbors, int(first + i)).x | ltLeft[i] << 16u | ltBelow[i] << 24u;
+}
+#endif
+
+bool ltComplete(uint neighbors)
+{
+  return (neighbors & 255u) > 0u && (neighbors & 0xFF00u) > 0u && (neighbors & 0xFF0000u) > 0u &&
+    neighbors > 0xFFFFFFu;
 }
 
 // The derivative W of the normal along the surface, n(x + d) = n(x) + W d, by least
 // squares over the neighbours, in tangents t1 and t2: xx, xy (symmetric part), yy. Its
 // trace is k1 + k2: a sphere of radius R with outward normals has 2/R exactly, however
 // large the pixels are.
-vec3 ltShapeOperator(inout ltSurfacePoint s, ivec2 p, uint place, ivec4 firsts, out vec3 t1,
+vec3 ltShapeOperator(inout ltSurfacePoint s, ivec2 p, uint place, uint neighbors, out vec3 t1,
   out vec3 t2)
 {
   t1 = normalize(abs(s.normal.x) > 0.5 ? vec3(s.normal.y, -s.normal.x, 0.0)
                                        : vec3(0.0, s.normal.z, -s.normal.y));
   t2 = cross(s.normal, t1);
-  uint neighbors = texelFetch(ltNeighbors, int(place)).x;
   vec3 a = vec3(0.0); // sum of d d^T: xx, xy, yy
   vec4 b = vec4(0.0); // sum of dn d^T: xx, xy, yx, yy
-  int found = 0;
   for (int side = 0; side < 4; ++side)
   {
     int i = int((neighbors >> uint(8 * side)) & 255u) - 1;
-    int at = i < 0 ? int(place) : firsts[side] + i;
+    int at = i < 0 ? int(place) : ltFirsts[side] + i;
     s.at[side] = i < 0 ? -1 : at;
-    found += i < 0 ? 0 : 1;
     ltSurfacePoint o = ltPointAt(i < 0 ? p : p + ltSides[side], uint(at));
     vec3 d3 = o.position - s.position;
     vec3 n3 = o.normal - s.normal;
@@ -69,7 +117,7 @@ vec3 ltShapeOperator(inout ltSurfacePoint s, ivec2 p, uint place, ivec4 firsts, 
     a += vec3(d.x * d.x, d.x * d.y, d.y * d.y);
     b += vec4(n.x * d.x, n.x * d.y, n.y * d.x, n.y * d.y);
   }
-  s.complete = found == 4;
+  s.complete = ltComplete(neighbors);
   float det = a.x * a.z - a.y * a.y;
   if (det <= 1e-12 * (a.x + a.z) * (a.x + a.z))
   {

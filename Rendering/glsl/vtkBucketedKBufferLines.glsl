@@ -31,7 +31,7 @@ ltFeature ltFeatureAt(ivec2 p, int place)
   f.position = s.position;
   f.normal = s.normal;
   f.w = mat3(a.x, a.y, b.x, a.y, b.y, c.x, b.x, c.x, c.y);
-  f.complete = t.w != 0u;
+  f.complete = ltComplete(t.w);
   return f;
 }
 

@@ -2,14 +2,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // vtkBucketedKBufferPass: the nearest nodes of a pixel in order of depth, and the
-// rest merged. Defined before: LT_ROOM >= k, the number of layers;
-// vtkBucketedKBufferRead.glsl.
+// rest merged. Defined before: LT_ROOM >= k, the number of layers, a power of 2;
+// LT_EACH: LT_ITEM(0) to LT_ITEM(LT_ROOM - 1); LT_NETWORK: LT_EXCHANGE(i, j) of a sorting
+// network of LT_ROOM; vtkBucketedKBufferRead.glsl.
 //
 // Nothing here depends on the order in which nodes came: nodes of one depth are
 // ordered by what they show, and are never split between list and tail; the tail's
 // sums are integers.
 //
-// Loops hold as few fetches as can be: a SIMD machine runs both sides of an if.
+// Loops hold as few fetches as can be: a SIMD machine runs both sides of an if. Fixed
+// places of an array are fast everywhere, computed ones are not: thence the network.
 
 uint ltDepths[LT_ROOM]; // bits of the depth in DC << 1 | thin: floats >= 0 sort as their bits do
 uint ltNodes[LT_ROOM];
@@ -69,40 +71,63 @@ bool ltContentBefore(uint a, uint b)
 
 void ltGather(uint pixel, int layers)
 {
-  // 1. The nearest by depth, by insertion: lists are short, and often nearly sorted.
   uint head = ltGetHead(pixel);
-  uint nearestLeft = 0xFFFFFFFFu; // of those that had no room
-  bool tie = false;
-  for (uint node = head; node != LT_NONE;)
+  if (head == LT_NONE)
+  {
+    return;
+  }
+  // 1. As many as there is room for, then in order by a network.
+#define LT_ITEM(i) ltDepths[i] = 0xFFFFFFFFu;
+  LT_EACH
+#undef LT_ITEM
+  uint node = head;
+  do
   {
     uvec2 link = ltGetLink(node);
-    uint depth = link.y;
-    if (ltCount == layers)
-    {
-      --ltCount;
-      uint last = ltDepths[ltCount];
-      nearestLeft = min(nearestLeft, max(last, depth));
-      if (depth >= last)
-      {
-        depth = last;
-        node = ltNodes[ltCount];
-      }
-    }
-    int i = ltCount;
+    ltDepths[ltCount] = link.y;
+    ltNodes[ltCount] = node;
+    ++ltCount;
+    node = link.x;
+  } while (node != LT_NONE && ltCount < LT_ROOM);
+#define LT_EXCHANGE(i, j)                                                                          \
+  {                                                                                                \
+    uint a = ltDepths[i], b = ltDepths[j], m = ltNodes[i], n = ltNodes[j];                         \
+    bool turn = b < a;                                                                             \
+    ltDepths[i] = min(a, b);                                                                       \
+    ltDepths[j] = max(a, b);                                                                       \
+    ltNodes[i] = turn ? n : m;                                                                     \
+    ltNodes[j] = turn ? m : n;                                                                     \
+  }
+  LT_NETWORK
+#undef LT_EXCHANGE
+
+  // 2. The others, by insertion; what there is no room for is left.
+  uint nearestLeft = 0xFFFFFFFFu;
+  while (node != LT_NONE)
+  {
+    uvec2 link = ltGetLink(node);
+    uint last = ltDepths[LT_ROOM - 1];
+    uint depth = min(last, link.y);
+    uint inserted = link.y < last ? node : ltNodes[LT_ROOM - 1];
+    nearestLeft = min(nearestLeft, max(last, link.y));
+    int i = LT_ROOM - 1;
     while (i > 0 && depth < ltDepths[i - 1])
     {
       ltDepths[i] = ltDepths[i - 1];
       ltNodes[i] = ltNodes[i - 1];
       --i;
     }
-    tie = tie || (i > 0 && depth == ltDepths[i - 1]);
     ltDepths[i] = depth;
-    ltNodes[i] = node;
-    ++ltCount;
+    ltNodes[i] = inserted;
     node = link.x;
   }
+  if (ltCount > layers)
+  {
+    nearestLeft = min(nearestLeft, ltDepths[layers]);
+    ltCount = layers;
+  }
 
-  // 2. The tail: all that are not nearer than the nearest left out.
+  // 3. The tail: all that are not nearer than the nearest left out.
   if (nearestLeft != 0xFFFFFFFFu)
   {
     while (ltCount > 0 && ltDepths[ltCount - 1] == nearestLeft)
@@ -110,7 +135,7 @@ void ltGather(uint pixel, int layers)
       --ltCount;
     }
   }
-  for (uint node = nearestLeft == 0xFFFFFFFFu ? LT_NONE : head; node != LT_NONE;)
+  for (node = nearestLeft == 0xFFFFFFFFu ? LT_NONE : head; node != LT_NONE;)
   {
     uvec2 link = ltGetLink(node);
     if (link.y >= nearestLeft)
@@ -120,11 +145,20 @@ void ltGather(uint pixel, int layers)
     node = link.x;
   }
 
-  // 3. Equal depths by content.
+  // 4. Equal depths by content.
+  bool tie = false;
+  bool again = false; // see 5
+  uint before = 0xFFFFFFFFu;
+#define LT_ITEM(i)                                                                                 \
+  tie = tie || (i < ltCount && ltDepths[i] == before);                                             \
+  again = again || (i < ltCount && (ltDepths[i] & before & 1u) == 1u && ltDepths[i] - before <= 8u); \
+  before = ltDepths[i];
+  LT_EACH
+#undef LT_ITEM
   int count = tie ? ltCount : 0;
   for (int j = 1; j < count; ++j)
   {
-    uint node = ltNodes[j];
+    node = ltNodes[j];
     int i = j;
     while (i > 0 && ltDepths[i - 1] == ltDepths[j] && ltContentBefore(node, ltNodes[i - 1]))
     {
@@ -134,20 +168,23 @@ void ltGather(uint pixel, int layers)
     ltNodes[i] = node;
   }
 
-  // 4. VTK draws a wireframe's edge for each of its triangles, a point likewise: the
+  // 5. VTK draws a wireframe's edge for each of its triangles, a point likewise: the
   // same fragment again and again, but for the rounding of its depth.
-  count = 0;
-  for (int j = 0; j < ltCount; ++j)
+  if (again)
   {
-    uint depth = ltDepths[j];
-    bool again = count > 0 && (depth & ltDepths[max(count - 1, 0)] & 1u) == 1u &&
-      depth - ltDepths[max(count - 1, 0)] <= 8u;
-    if (!again)
+    count = 0;
+    for (int j = 0; j < ltCount; ++j)
     {
-      ltDepths[count] = depth;
-      ltNodes[count] = ltNodes[j];
-      ++count;
+      uint depth = ltDepths[j];
+      uint kept = ltDepths[max(count - 1, 0)];
+      bool same = count > 0 && (depth & kept & 1u) == 1u && depth - kept <= 8u;
+      if (!same)
+      {
+        ltDepths[count] = depth;
+        ltNodes[count] = ltNodes[j];
+        ++count;
+      }
     }
+    ltCount = count;
   }
-  ltCount = count;
 }

@@ -2,38 +2,57 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // vtkBucketedKBufferPass, neighbour stage (compute): each fragment's neighbour on
-// the same surface in the pixels around. Of the fragments i of a pixel and j of the
-// next one in the bucket of their shape,
+// the same surface in the pixels right and above. Of the fragments i of a pixel and j of
+// the next one in the bucket of their shape,
 //   epsilon(i, j) = (1 - n_i . n_j) + |z_i - z_j|^2,   z in footprints of a pixel
 // (Carnecky et al. 2013; Murray et al. 2016). i and j are neighbours if each is the
-// other's best (the reverse check). One thread looks right and up, and writes both
-// ends. Defined before: vtkBucketedKBufferPixel.glsl, LT_ROOM.
+// other's best (the reverse check). Defined before: vtkBucketedKBufferPixel.glsl, LT_ROOM.
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 1) coherent buffer ltNeighborBlock { uint ltNeighbor[]; };
-
-uniform int ltFirstRow;
-uniform int ltLastRow; // one more
+layout(std430, binding = 1) writeonly buffer ltNeighborBlock { uint ltNeighbor[]; };
 
 float ltBackError[LT_ROOM]; // of the other pixel's fragments: their best so far
 int ltBack[LT_ROOM];
 int ltForth[LT_ROOM];
+uint ltFound[LT_ROOM];
 
 // Loops test at their end: SIMD machines run a body once more, for nothing, where the
 // test comes first.
 void ltMatch(uvec2 here, uvec2 there, uint shift)
 {
   int first = int(here.x);
-  int count = int(here.y);
+  int count = ltFragments(here);
+  int buckets = ltBuckets(here);
   int firstThere = int(there.x);
-  int countThere = int(there.y);
-  int slot = 0;
+  int countThere = ltFragments(there);
+  int bucketsThere = ltBuckets(there);
+  // Both in order of shape: along both at once.
+  int b = 0;
+  int c = 0;
+  uint bucket = texelFetch(ltBucketList, first).x;
+  uint other = texelFetch(ltBucketList, firstThere).x;
+  bool more;
   do
   {
-    uvec2 bucket = texelFetch(ltBuckets, first + slot).xy;
-    ivec2 range = ivec2(int(bucket.y & 255u), int((bucket.y >> 8u) & 255u));
-    ivec2 other = ltFindBucket(firstThere, countThere, bucket.x);
-    if (bucket.y != 0u && other.x <= other.y)
+    bool same;
+    ivec2 range;
+    ivec2 rangeThere;
+    do
+    {
+      same = bucket >> 6u == other >> 6u;
+      bool step_ = bucket >> 6u <= other >> 6u;
+      bool stepThere = bucket >> 6u >= other >> 6u;
+      b += step_ ? 1 : 0;
+      c += stepThere ? 1 : 0;
+      range.x = int(bucket & 63u);
+      rangeThere.x = int(other & 63u);
+      bucket = texelFetch(ltBucketList, first + min(b, buckets - 1)).x;
+      other = texelFetch(ltBucketList, firstThere + min(c, bucketsThere - 1)).x;
+      range.y = b < buckets ? int(bucket & 63u) - 1 : count - 1;
+      rangeThere.y = c < bucketsThere ? int(other & 63u) - 1 : countThere - 1;
+      more = b < buckets && c < bucketsThere;
+    } while (!same && more);
+    if (same)
     {
       int i = range.x;
       do
@@ -44,7 +63,7 @@ void ltMatch(uvec2 here, uvec2 there, uint shift)
         vec3 n = ltUnpackNormal(record.y);
         float best = 1e30;
         int bestJ = -1;
-        int j = other.x;
+        int j = rangeThere.x;
         do
         {
           uvec2 candidate = texelFetch(ltRecords, firstThere + j).xy;
@@ -58,7 +77,7 @@ void ltMatch(uvec2 here, uvec2 there, uint shift)
           ltBackError[j] = back ? epsilon : ltBackError[j];
           ltBack[j] = back ? i : ltBack[j];
           ++j;
-        } while (j <= other.y);
+        } while (j <= rangeThere.y);
         ltForth[i] = bestJ;
         ++i;
       } while (i <= range.y);
@@ -66,35 +85,44 @@ void ltMatch(uvec2 here, uvec2 there, uint shift)
       do
       {
         int j = ltForth[i];
-        if (j >= 0 && ltBack[j] == i)
-        {
-          atomicOr(ltNeighbor[first + i], uint(j + 1) << shift);
-          atomicOr(ltNeighbor[firstThere + j], uint(i + 1) << (shift + 16u));
-        }
+        bool mutual = j >= 0 && ltBack[max(j, 0)] == i;
+        ltFound[i] |= mutual ? uint(j + 1) << shift : 0u;
         ++i;
       } while (i <= range.y);
     }
-    ++slot;
-  } while (slot < count);
+  } while (more);
 }
 
 void main()
 {
   int column = int(gl_GlobalInvocationID.x);
-  int row = ltFirstRow + int(gl_GlobalInvocationID.y);
-  if (column >= ltSize.x || row >= ltLastRow)
+  int row = ltRows.x + int(gl_GlobalInvocationID.y);
+  if (column >= ltSize.x || row >= ltRows.y)
   {
     return;
   }
   int pixel = row * ltSize.x + column;
   uvec2 here = texelFetch(ltPixels, pixel).xy;
+  if (here.y == 0u)
+  {
+    return;
+  }
+#define LT_ITEM(i) ltFound[i] = 0u;
+  LT_EACH
+#undef LT_ITEM
   for (int side = 0; side < 2; ++side)
   {
-    bool inside = side == 0 ? column + 1 < ltSize.x : row + 1 < ltLastRow;
+    bool inside = side == 0 ? column + 1 < ltSize.x : row + 1 < ltRows.y;
     uvec2 there = texelFetch(ltPixels, inside ? pixel + (side == 0 ? 1 : ltSize.x) : pixel).xy;
-    if (inside && here.y > 0u && there.y > 0u)
+    if (inside && there.y > 0u)
     {
       ltMatch(here, there, uint(side) * 8u);
     }
   }
+  int i = 0;
+  do
+  {
+    ltNeighbor[int(here.x) + i] = ltFound[i];
+    ++i;
+  } while (i < ltFragments(here));
 }

@@ -11,20 +11,16 @@ layout(std430, binding = 4) coherent buffer ltCounterBlock { uint ltCounter[]; }
 layout(std430, binding = 5) writeonly buffer ltPixelBlock { uvec4 ltPixel[]; };
 layout(std430, binding = 6) writeonly buffer ltRecordBlock { uvec2 ltRecord[]; };
 layout(std430, binding = 7) writeonly buffer ltNodeBlock { uint ltNode[]; };
-layout(std430, binding = 0) writeonly buffer ltBucketBlock { uvec2 ltBucket[]; };
-layout(std430, binding = 1) writeonly buffer ltNeighborBlock { uint ltNeighbor[]; };
+layout(std430, binding = 0) writeonly buffer ltBucketBlock { uint ltBucket[]; };
 
-uniform int ltFirstRow;
-uniform int ltLastRow; // one more
 uniform int ltLayers;
 
-uint ltShapes[LT_ROOM]; // ordered
-uint ltRanks[LT_ROOM];
+uint ltKeys[LT_ROOM]; // shape << 6 | rank in depth, ordered
 
 void main()
 {
-  uvec2 p = gl_GlobalInvocationID.xy + uvec2(0u, uint(ltFirstRow));
-  if (p.x >= uint(ltSize.x) || p.y >= uint(ltLastRow))
+  uvec2 p = gl_GlobalInvocationID.xy + uvec2(0u, uint(ltRows.x));
+  if (p.x >= uint(ltSize.x) || p.y >= uint(ltRows.y))
   {
     return;
   }
@@ -43,51 +39,49 @@ void main()
     vec4 layer = ltTailLayer();
     tail = uvec2(packHalf2x16(layer.rg), packHalf2x16(layer.ba));
   }
-  ltPixel[pixel] = uvec4(first, uint(ltCount), tail);
-
-  // By shape; of one shape the order of depth stays.
-  for (int j = 0; j < ltCount; ++j)
+  uint buckets = 0u;
+  if (ltCount > 0)
   {
+#define LT_ITEM(i) ltKeys[i] = 0xFFFFFFFFu;
+    LT_EACH
+#undef LT_ITEM
+    int rank = 0;
+    do
+    {
 #if LT_SINGLE_BUCKET
-    uint shape = 0u;
+      uint shape = 0u;
 #else
-    uint shape = ltGetSurface(ltNodes[j]).x;
+      uint shape = ltGetSurface(ltNodes[rank]).x & 0xFFFFFFu;
 #endif
-    int i = j;
-    while (i > 0 && shape < ltShapes[i - 1])
-    {
-      ltShapes[i] = ltShapes[i - 1];
-      ltRanks[i] = ltRanks[i - 1];
-      --i;
-    }
-    ltShapes[i] = shape;
-    ltRanks[i] = uint(j);
+      ltKeys[rank] = shape << 6u | uint(rank);
+      ++rank;
+    } while (rank < ltCount);
+#define LT_EXCHANGE(i, j)                                                                          \
+  {                                                                                                \
+    uint a = ltKeys[i], b = ltKeys[j];                                                             \
+    ltKeys[i] = min(a, b);                                                                         \
+    ltKeys[j] = max(a, b);                                                                         \
   }
-  for (int i = 0; i < ltCount; ++i)
-  {
-    uint rank = ltRanks[i];
-    uint node = ltNodes[rank];
-    uint at = first + uint(i);
-    ltRecord[at] =
-      uvec2(floatBitsToUint(ltDepthDCToZ(ltDepths[rank] >> 1u)), ltGetSurface(node).y);
-    ltNode[at] = node | rank << 26u;
-    ltBucket[at] = LT_NO_BUCKET;
-    ltNeighbor[at] = 0u;
-  }
-  uvec2 taken = uvec2(0u); // slots, as bits
-  int begin = 0;
-  for (int i = 0; i < ltCount; ++i)
-  {
-    if (i + 1 == ltCount || ltShapes[i + 1] != ltShapes[i])
+    LT_NETWORK
+#undef LT_EXCHANGE
+    uint before = 0xFFFFFFFFu;
+    uint i = 0u;
+    do
     {
-      uint slot = ltSlot(ltShapes[i], uint(ltCount));
-      while (((slot < 32u ? taken.x >> slot : taken.y >> (slot - 32u)) & 1u) != 0u)
+      uint key = ltKeys[i];
+      uint of = key & 63u;
+      uint node = ltNodes[of];
+      ltRecord[first + i] =
+        uvec2(floatBitsToUint(ltDepthDCToZ(ltDepths[of] >> 1u)), ltGetSurface(node).y);
+      ltNode[first + of] = node | i << 26u;
+      if (key >> 6u != before)
       {
-        slot = slot + 1u == uint(ltCount) ? 0u : slot + 1u;
+        ltBucket[first + buckets] = (key & ~63u) | i;
+        ++buckets;
+        before = key >> 6u;
       }
-      taken |= slot < 32u ? uvec2(1u << slot, 0u) : uvec2(0u, 1u << (slot - 32u));
-      ltBucket[first + slot] = uvec2(ltShapes[i], uint(begin) | uint(i) << 8u | 1u << 16u);
-      begin = i + 1;
-    }
+      ++i;
+    } while (i < uint(ltCount));
   }
+  ltPixel[pixel] = uvec4(first, uint(ltCount) | buckets << 8u, tail);
 }

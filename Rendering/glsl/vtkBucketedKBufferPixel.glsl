@@ -5,57 +5,38 @@
 // how they are found. Defined before: vtkBucketedKBufferRead.glsl (for ltUnpackNormal
 // too).
 //
-//   ltPixels[p]          x: first fragment, y: how many, zw: the tail's RGBA (half)
-//   ltRecords[first+i]   x: bits of z in VC, y: outward normal in VC
-//   ltNodes[first+i]     node | rank in depth << 26
-//   ltBuckets[first+s]   x: style << 24 | shape, y: first i | last i << 8 | 1 << 16;
-//                        y = 0: no bucket. The pixel's hash table, open addressing.
+//   ltPixels[p]          x: first fragment, y: how many | how many buckets << 8,
+//                        zw: the tail's RGBA (half)
+//   ltNodeList[first+r]  of rank r in depth: node | i << 26
+//   ltRecords[first+i]   in order of shape, then of depth. x: bits of z in VC, y: outward
+//                        normal in VC
+//   ltBucketList[first+b] in order of shape: shape << 6 | the bucket's first i
 //   ltNeighbors[first+i] i + 1 of the neighbour on the same surface, 0: missing:
-//                        right | up << 8 | left << 16 | down << 24
-// Fragments are ordered by shape, then by depth: a bucket is a range.
+//                        right | up << 8
+// A bucket is a range. Murray et al. find it in a hash table, by shape mod k; in order, the
+// buckets of two pixels are found by going along both.
 
 uniform usamplerBuffer ltPixels;
 uniform usamplerBuffer ltRecords;
 uniform usamplerBuffer ltNodeList;
-uniform usamplerBuffer ltBuckets;
+uniform usamplerBuffer ltBucketList;
 uniform usamplerBuffer ltNeighbors;
 
 uniform ivec2 ltSize;      // of the viewport, in pixels
+uniform ivec2 ltRows;      // first and one past the last that there are fragments of
 uniform int ltParallel;    // 1: parallel projection
 uniform vec4 ltProjection; // x, y: VC to DC, zw: of the projection's centre
 uniform vec2 ltDepthToVC;  // the last two of the third row of VC to DC
 uniform float ltFootprint; // size of a pixel, at distance 1 if not parallel
 
-#define LT_NO_BUCKET uvec2(0u)
-
-// shape mod slots. Actors are numbered one after the other: no collisions among as many
-// as there are slots. By floats, exact below 2^24: SIMD machines divide integers slowly.
-uint ltSlot(uint shape, uint slots)
+int ltFragments(uvec2 pixel)
 {
-  int n = int(slots);
-  int s = int(shape & 0xFFFFFFu);
-  int rest = s - n * int(float(s) / float(n));
-  rest += rest < 0 ? n : 0;
-  return uint(rest >= n ? rest - n : rest);
+  return int(pixel.y & 255u);
 }
 
-// First i and last i of a shape's fragments in the pixel; x > y: there are none.
-ivec2 ltFindBucket(int first, int count, uint shape)
+int ltBuckets(uvec2 pixel)
 {
-  int slot = int(ltSlot(shape, uint(count)));
-  ivec2 range = ivec2(1, 0);
-  int tries = 0;
-  bool again;
-  do
-  {
-    uvec2 bucket = texelFetch(ltBuckets, first + slot).xy;
-    bool found = bucket.x == shape && bucket.y != 0u;
-    range = found ? ivec2(int(bucket.y & 255u), int((bucket.y >> 8u) & 255u)) : range;
-    slot = slot + 1 == count ? 0 : slot + 1;
-    ++tries;
-    again = !found && bucket.y != 0u && tries < count;
-  } while (again);
-  return range;
+  return int(pixel.y >> 8u);
 }
 
 float ltDepthDCToZ(uint depthBits)

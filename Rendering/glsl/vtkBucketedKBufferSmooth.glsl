@@ -10,32 +10,30 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 2) writeonly buffer ltTensorBlock { uvec4 ltTensor[]; };
 
 uniform usamplerBuffer ltTensors; // before
-uniform int ltFirstRow;
-uniform int ltLastRow; // one more
 
 void main()
 {
-  ivec2 p = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, ltFirstRow);
-  if (p.x >= ltSize.x || p.y >= ltLastRow)
+  ivec2 p = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, ltRows.x);
+  if (p.x >= ltSize.x || p.y >= ltRows.y)
   {
     return;
   }
   uvec2 here = texelFetch(ltPixels, p.y * ltSize.x + p.x).xy;
-  ivec4 firsts = ltFirstsAround(p);
-  for (uint i = 0u; i < here.y; ++i)
+  ltLookAround(p);
+  for (uint i = 0u; i < uint(ltFragments(here)); ++i)
   {
     int place = int(here.x + i);
-    uint neighbors = texelFetch(ltNeighbors, place).x;
     uvec4 own = texelFetch(ltTensors, place);
+    uint neighbors = own.w;
     vec4 sum = vec4(0.0);
     vec2 rest = vec2(0.0);
     float weight = 0.0;
     for (int side = -1; side < 4; ++side)
     {
       int n = side < 0 ? 1 : int((neighbors >> uint(8 * max(side, 0))) & 255u);
-      int at = side < 0 || n == 0 ? place : firsts[max(side, 0)] + n - 1;
+      int at = side < 0 || n == 0 ? place : ltFirsts[max(side, 0)] + n - 1;
       uvec4 t = texelFetch(ltTensors, at);
-      float use = n > 0 && t.w != 0u ? 1.0 : 0.0;
+      float use = n > 0 && ltComplete(t.w) ? 1.0 : 0.0;
       sum += use * vec4(unpackHalf2x16(t.x), unpackHalf2x16(t.y));
       rest += use * unpackHalf2x16(t.z);
       weight += use;

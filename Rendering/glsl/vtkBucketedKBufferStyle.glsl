@@ -16,8 +16,6 @@ uniform sampler2D ltOpacity;    // over |kappa| and z; a block of rows per style
 
 uniform int ltStyles;
 
-int ltPlaceOfRank[LT_ROOM];
-
 // -1 convex, 0 flat, 1 concave; a missing neighbour is -1, a contour.
 float ltKappa(bool complete, float trace)
 {
@@ -76,24 +74,22 @@ void main()
   {
     discard;
   }
-  ivec4 firsts = ltFirstsAround(p);
-  int count = int(here.y);
-  for (int i = 0; i < count; ++i)
-  {
-    ltPlaceOfRank[texelFetch(ltNodeList, int(here.x) + i).x >> 26u] = i;
-  }
+  ltLookAround(p);
   vec3 color = vec3(0.0);
   float transparency = 1.0;
+  int count = ltFragments(here.xy);
   for (int rank = 0; rank < count; ++rank)
   {
-    uint place = here.x + uint(ltPlaceOfRank[rank]);
-    uint node = texelFetch(ltNodeList, int(place)).x & 0x3FFFFFFu;
+    uint item = texelFetch(ltNodeList, int(here.x) + rank).x;
+    uint i = item >> 26u;
+    uint place = here.x + i;
+    uint node = item & 0x3FFFFFFu;
     vec4 c = ltGetColor(node);
     uvec2 surface = ltGetSurface(node);
     ltSurfacePoint s = ltPointAt(p, place);
     vec3 t1;
     vec3 t2;
-    vec3 w = ltShapeOperator(s, p, place, firsts, t1, t2);
+    vec3 w = ltShapeOperator(s, p, place, ltNeighborsOf(here.x, i), t1, t2);
     vec4 styled = ltStylise(c, surface.x >> 24u, s, w.x + w.z, p, place);
     c = surface.y == LT_NO_NORMAL ? c : styled;
 

@@ -5,36 +5,33 @@
 // the normal at each fragment as a tensor in VC, so that neighbours can compare.
 // Defined before: vtkBucketedKBufferCurvature.glsl.
 //
-//   ltTensors[place]  xyz: W's xx, xy, xz, yy, yz, zz as half; w: 1 if complete
+//   ltTensors[place]  xyz: W's xx, xy, xz, yy, yz, zz as half; w: neighbours, see ltNeighborsOf
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 2) writeonly buffer ltTensorBlock { uvec4 ltTensor[]; };
 
-uniform int ltFirstRow;
-uniform int ltLastRow; // one more
-
 void main()
 {
-  ivec2 p = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, ltFirstRow);
-  if (p.x >= ltSize.x || p.y >= ltLastRow)
+  ivec2 p = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, ltRows.x);
+  if (p.x >= ltSize.x || p.y >= ltRows.y)
   {
     return;
   }
   uvec2 here = texelFetch(ltPixels, p.y * ltSize.x + p.x).xy;
-  ivec4 firsts = ltFirstsAround(p);
-  for (uint i = 0u; i < here.y; ++i)
+  ltLookAround(p);
+  for (uint i = 0u; i < uint(ltFragments(here)); ++i)
   {
     uint place = here.x + i;
     ltSurfacePoint s = ltPointAt(p, place);
     vec3 t1;
     vec3 t2;
-    vec3 w = ltShapeOperator(s, p, place, firsts, t1, t2);
+    uint neighbors = ltNeighborsOf(here.x, i);
+    vec3 w = ltShapeOperator(s, p, place, neighbors, t1, t2);
     // In units of 1 / footprint, which half floats hold whatever the world's unit is.
     w *= ltFootprintAt(s.position.z);
     mat3 m = w.x * outerProduct(t1, t1) + w.z * outerProduct(t2, t2) +
       w.y * (outerProduct(t1, t2) + outerProduct(t2, t1));
     ltTensor[place] = uvec4(packHalf2x16(vec2(m[0][0], m[0][1])),
-      packHalf2x16(vec2(m[0][2], m[1][1])), packHalf2x16(vec2(m[1][2], m[2][2])),
-      s.complete ? 1u : 0u);
+      packHalf2x16(vec2(m[0][2], m[1][1])), packHalf2x16(vec2(m[1][2], m[2][2])), neighbors);
   }
 }
