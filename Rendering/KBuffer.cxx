@@ -79,7 +79,7 @@ KBuffer::KBuffer() = default;
 KBuffer::~KBuffer() = default;
 
 //------------------------------------------------------------------------------
-std::vector<StorageBuffer*> KBuffer::All()
+std::vector<TexelBuffer*> KBuffer::All()
 {
   return { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter,
     &this->Pixels, &this->Records, &this->NodeList, &this->Buckets, &this->Neighbors,
@@ -89,7 +89,7 @@ std::vector<StorageBuffer*> KBuffer::All()
 //------------------------------------------------------------------------------
 void KBuffer::Release(vtkWindow* window)
 {
-  for (StorageBuffer* buffer : this->All())
+  for (TexelBuffer* buffer : this->All())
   {
     buffer->Release();
   }
@@ -119,7 +119,7 @@ void KBuffer::Release(vtkWindow* window)
   this->QuadKey.clear();
   this->Tables.clear();
   this->Capacity = 0;
-  this->LargestBlock = 0;
+  this->MostTexels = 0;
   this->Window = nullptr;
 }
 
@@ -135,22 +135,17 @@ std::string KBuffer::WhyNot()
     return "OpenGL is " + std::to_string(major) + "." + std::to_string(minor) +
       ", expected 4.3 or later";
   }
-  if (this->LargestBlock == 0)
+  if (this->MostTexels == 0)
   {
-    GLint64 largest = 0;
-    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
     GLint texels = 0;
     glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
-    this->LargestBlock = largest;
     this->MostTexels = texels;
   }
-  const vtkTypeInt64 most =
-    std::min(this->LargestBlock / (this->Now.style ? 16 : 4), this->MostTexels);
-  if (vtkTypeInt64(this->Now.size[0]) * this->Now.size[1] > most)
+  if (vtkTypeInt64(this->Now.size[0]) * this->Now.size[1] > this->MostTexels)
   {
     return "the viewport has " + std::to_string(this->Now.size[0]) + " x " +
-      std::to_string(this->Now.size[1]) + " pixels, expected at most " + std::to_string(most) +
-      " on this GPU";
+      std::to_string(this->Now.size[1]) + " pixels, expected at most " +
+      std::to_string(this->MostTexels) + " on this GPU";
   }
   return std::string();
 }
@@ -158,11 +153,11 @@ std::string KBuffer::WhyNot()
 //------------------------------------------------------------------------------
 vtkTypeInt64 KBuffer::MostNodes(vtkTypeInt64 memoryLimit) const
 {
-  const int widest = this->Now.floatColor || this->Now.lines ? 16 : 8;
-  const vtkTypeInt64 byBlock = std::min(this->LargestBlock / widest, this->MostTexels);
+  // A fragment's neighbours are written as four texels.
+  const vtkTypeInt64 byTexels = this->MostTexels / (this->Now.style ? 4 : 1);
   const vtkTypeInt64 byLimit = memoryLimit / (this->BitsPerFragment() / 8);
   // Node numbers have 26 bits in ltNodes.
-  return std::max<vtkTypeInt64>(1024, std::min(std::min(byBlock, byLimit), vtkTypeInt64(1) << 26));
+  return std::max<vtkTypeInt64>(1024, std::min(std::min(byTexels, byLimit), vtkTypeInt64(1) << 26));
 }
 
 //------------------------------------------------------------------------------
@@ -180,7 +175,7 @@ void KBuffer::ReserveNodes(vtkTypeInt64 nodes)
 //------------------------------------------------------------------------------
 void KBuffer::ReleaseNodes()
 {
-  for (StorageBuffer* buffer : { &this->Links, &this->Colors, &this->Surfaces, &this->Records,
+  for (TexelBuffer* buffer : { &this->Links, &this->Colors, &this->Surfaces, &this->Records,
          &this->NodeList, &this->Buckets, &this->Neighbors, &this->Tensors, &this->SmoothTensors })
   {
     buffer->Release();
@@ -201,7 +196,7 @@ int KBuffer::BitsPerFragment() const
 vtkTypeInt64 KBuffer::Bytes()
 {
   vtkTypeInt64 bytes = 0;
-  for (const StorageBuffer* buffer : this->All())
+  for (const TexelBuffer* buffer : this->All())
   {
     bytes += buffer->Bytes;
   }
@@ -228,26 +223,32 @@ int KBuffer::Room() const
 }
 
 //------------------------------------------------------------------------------
+GLenum KBuffer::ColorFormat() const
+{
+  return this->Now.floatColor ? GL_RGBA32F : GL_RGBA16F;
+}
+
+//------------------------------------------------------------------------------
 void KBuffer::BindForReading(const Uniforms& uniforms)
 {
   struct Reader
   {
-    StorageBuffer* buffer;
+    TexelBuffer* buffer;
     const char* name;
     GLenum format;
   };
   vtkOpenGLState* state = this->Window->GetState();
-  const GLenum color = this->Now.floatColor ? GL_RGBA32F : GL_RGBA16F;
-  for (const Reader& r : { Reader{ &this->Heads, "ltHeads", GL_R32UI },
-         Reader{ &this->Links, "ltLinks", GL_RG32UI }, Reader{ &this->Colors, "ltColors", color },
-         Reader{ &this->Surfaces, "ltSurfaces", GL_RG32UI },
-         Reader{ &this->Pixels, "ltPixels", GL_RGBA32UI },
-         Reader{ &this->Records, "ltRecords", GL_RG32UI },
-         Reader{ &this->NodeList, "ltNodeList", GL_R32UI },
-         Reader{ &this->Buckets, "ltBucketList", GL_R32UI },
-         Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
-         Reader{
-           this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI } })
+  for (const Reader& r :
+    { Reader{ &this->Heads, "ltHeads", GL_R32UI }, Reader{ &this->Links, "ltLinks", GL_RG32UI },
+      Reader{ &this->Colors, "ltColors", this->ColorFormat() },
+      Reader{ &this->Surfaces, "ltSurfaces", GL_RG32UI },
+      Reader{ &this->Pixels, "ltPixels", GL_RGBA32UI },
+      Reader{ &this->Records, "ltRecords", GL_RG32UI },
+      Reader{ &this->NodeList, "ltNodeList", GL_R32UI },
+      Reader{ &this->Buckets, "ltBucketList", GL_R32UI },
+      Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
+      Reader{
+        this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI } })
   {
     if (r.buffer->Bytes > 0 && uniforms.Has(r.name))
     {
@@ -524,11 +525,14 @@ void KBuffer::BeginGeometry(int low, int high)
   this->Heads.Fill(low * width * 4, (high - low) * width * 4, EndOfList);
   this->Counter.Fill(4 * NodesAsked, 4, 0);
   this->Counter.Fill(4 * FragmentsListed, 4, 0);
-  for (StorageBuffer* buffer :
-    { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter })
+  this->Heads.BindImage(0, GL_R32UI);
+  this->Links.BindImage(1, GL_RG32UI);
+  this->Colors.BindImage(2, this->ColorFormat());
+  if (this->Now.style)
   {
-    buffer->Bind();
+    this->Surfaces.BindImage(3, GL_RG32UI);
   }
+  this->Counter.BindImage(4, GL_R32UI);
   state->PushFramebufferBindings();
   this->GeometryTarget->Bind();
   this->GeometryTarget->ActivateDrawBuffers(1);
@@ -546,7 +550,7 @@ void KBuffer::BeginGeometry(int low, int high)
 void KBuffer::BeginVolume()
 {
   vtkOpenGLState* state = this->Window->GetState();
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   // The mapper copies the depth from what is bound for reading, and draws its box.
   this->DepthTarget->Bind(vtkOpenGLFramebufferObject::GetReadMode());
   state->vtkglEnable(GL_CULL_FACE);
@@ -558,8 +562,8 @@ vtkTypeInt64 KBuffer::EndGeometry()
 {
   this->OpaqueDepth->Deactivate();
   this->Window->GetState()->PopFramebufferBindings();
-  glMemoryBarrier(
-    GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
+    GL_TEXTURE_FETCH_BARRIER_BIT);
   return this->Counter.Read(NodesAsked);
 }
 
@@ -574,14 +578,15 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
   this->Buckets.Reserve(listed * 4);
   this->Neighbors.Reserve(listed * 4);
   this->Window->GetShaderCache()->ReleaseCurrentShader();
-  for (StorageBuffer* buffer : { &this->Pixels, &this->Records, &this->NodeList, &this->Buckets,
-         &this->Neighbors, &this->Counter })
-  {
-    buffer->Bind();
-  }
+  this->Pixels.BindImage(0, GL_RGBA32UI);
+  this->Records.BindImage(1, GL_RG32UI);
+  this->NodeList.BindImage(2, GL_R32UI);
+  this->Buckets.BindImage(3, GL_R32UI);
+  this->Counter.BindImage(4, GL_R32UI);
+  this->Neighbors.BindImage(5, GL_R32UI);
   const std::string head = "#version 430 core\n" + this->Defines(this->Room()) +
-    sortingNetwork(this->Room()) + define("LT_SINGLE_BUCKET", this->Now.singleBucket) + vtkBucketedKBufferRead +
-    vtkBucketedKBufferPixel;
+    sortingNetwork(this->Room()) + define("LT_SINGLE_BUCKET", this->Now.singleBucket) +
+    vtkBucketedKBufferRead + vtkBucketedKBufferPixel;
   const auto run = [&](ComputeProgram& program, int stage, const std::string& body)
   {
     std::string problem = program.Use(head + body);
@@ -593,7 +598,7 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
       uniforms.Set("ltLayers", this->Now.layers);
       glDispatchCompute(
         static_cast<GLuint>((this->Now.size[0] + 63) / 64), static_cast<GLuint>(high - low), 1);
-      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
+      glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
         GL_BUFFER_UPDATE_BARRIER_BIT);
       this->FreeUnits();
     }
@@ -605,6 +610,7 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
     run(this->Order, 3, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
   if (problem.empty())
   {
+    this->Neighbors.BindImage(5, GL_R8UI);
     problem = run(this->Match, 4, vtkBucketedKBufferMatch);
   }
   if (problem.empty() && this->Now.lines)
@@ -612,16 +618,16 @@ std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
     this->Tensors.Reserve(listed * 16);
     this->SmoothTensors.Reserve(listed * 16);
     this->LatestTensors = &this->Tensors;
-    this->Tensors.Bind();
+    this->Tensors.BindImage(0, GL_RGBA32UI);
     problem =
-      run(this->Tensor, 4, define("LT_FIND", 1) + vtkBucketedKBufferCurvature + vtkBucketedKBufferTensor);
+      run(this->Tensor, 4, std::string(vtkBucketedKBufferCurvature) + vtkBucketedKBufferTensor);
     for (int i = 0; i < this->Now.smoothing && problem.empty(); ++i)
     {
-      StorageBuffer* next =
+      TexelBuffer* next =
         this->LatestTensors == &this->Tensors ? &this->SmoothTensors : &this->Tensors;
-      next->Bind();
+      next->BindImage(0, GL_RGBA32UI);
       problem =
-        run(this->Smooth, 4, define("LT_FIND", 0) + vtkBucketedKBufferCurvature + vtkBucketedKBufferSmooth);
+        run(this->Smooth, 4, std::string(vtkBucketedKBufferCurvature) + vtkBucketedKBufferSmooth);
       this->LatestTensors = next;
     }
   }
@@ -635,13 +641,13 @@ bool KBuffer::Blend(int first, int last)
   vtkOpenGLState* state = this->Window->GetState();
   const int* size = this->Now.size;
   const int* origin = this->Now.origin;
-  this->Counter.Bind();
+  this->Counter.BindImage(4, GL_R32UI);
   const std::string key =
     this->Defines(this->Room()) + define("LT_READ_TARGET", this->Now.into.plain);
   if (!this->Quad || this->QuadKey != key)
   {
     const std::string body = this->Now.style
-      ? std::string(vtkBucketedKBufferPixel) + define("LT_FIND", 1) + vtkBucketedKBufferCurvature +
+      ? std::string(vtkBucketedKBufferPixel) + std::string(vtkBucketedKBufferCurvature) +
         (this->Now.lines ? vtkBucketedKBufferLines : "") + vtkBucketedKBufferStyle
       : std::string(vtkBucketedKBufferList) + vtkBucketedKBufferBlend;
     const std::string source = std::string("//VTK::System::Dec\n") + vtkBucketedKBufferExtensions +
@@ -721,10 +727,10 @@ void KBuffer::Mark(int stage)
 //------------------------------------------------------------------------------
 void KBuffer::Unbind()
 {
-  for (StorageBuffer* buffer : this->All())
+  for (GLuint unit = 0; unit < 6; ++unit)
   {
-    buffer->Unbind();
+    glBindImageTexture(unit, 0, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R32UI);
   }
-  glBindBuffer(GL_SHADER_STORAGE_BUFFER, 0);
+  glBindBuffer(GL_TEXTURE_BUFFER, 0);
 }
 } // namespace lighttransport

@@ -99,25 +99,25 @@ public:
   std::string OrderAndMatch(int low, int high, vtkTypeInt64 nodes); // 3, 4
   bool Blend(int first, int last);                                  // 5
   void Unbind();
-  StorageBuffer Counter{ 4 };
+  TexelBuffer Counter;
 
   vtkSmartPointer<vtkTextureObject> OpaqueDepth;
   vtkNew<vtkMatrix4x4> DCToVC; // transposed
 
 private:
-  StorageBuffer Heads{ 0 };
-  StorageBuffer Links{ 1 };
-  StorageBuffer Colors{ 2 };
-  StorageBuffer Surfaces{ 3 };
-  // with stylisation; bound as in vtkBucketedKBufferOrder.glsl
-  StorageBuffer Pixels{ 5 };
-  StorageBuffer Records{ 6 };
-  StorageBuffer NodeList{ 7 };
-  StorageBuffer Buckets{ 0 };
-  StorageBuffer Neighbors{ 1 };
-  StorageBuffer Tensors{ 2 };
-  StorageBuffer SmoothTensors{ 2 };
-  StorageBuffer* LatestTensors = nullptr;
+  TexelBuffer Heads;
+  TexelBuffer Links;
+  TexelBuffer Colors;
+  TexelBuffer Surfaces;
+  // with stylisation
+  TexelBuffer Pixels;
+  TexelBuffer Records;
+  TexelBuffer NodeList;
+  TexelBuffer Buckets;
+  TexelBuffer Neighbors;
+  TexelBuffer Tensors;
+  TexelBuffer SmoothTensors;
+  TexelBuffer* LatestTensors = nullptr;
   ComputeProgram Order;
   ComputeProgram Match;
   ComputeProgram Tensor;
@@ -133,8 +133,7 @@ private:
   vtkSmartPointer<vtkTextureObject> ParameterTable;
   std::vector<std::pair<vtkCurvatureOpacityProperty*, vtkMTimeType>> Tables; // what is in them
   std::vector<int> Units;                                                    // texture units in use
-  vtkTypeInt64 LargestBlock = 0; // GL_MAX_SHADER_STORAGE_BLOCK_SIZE
-  vtkTypeInt64 MostTexels = 0;   // GL_MAX_TEXTURE_BUFFER_SIZE
+  vtkTypeInt64 MostTexels = 0; // GL_MAX_TEXTURE_BUFFER_SIZE
 
   // the camera, see vtkBucketedKBufferPixel.glsl
   int Parallel = 0;
@@ -146,8 +145,9 @@ private:
 
   std::chrono::steady_clock::time_point LastMark;
 
-  std::vector<StorageBuffer*> All();
+  std::vector<TexelBuffer*> All();
   int Room() const;
+  GLenum ColorFormat() const;
   void CopyDepth();
   void CopyColor();
   void FillTables();

@@ -9,7 +9,7 @@
 namespace lighttransport
 {
 //------------------------------------------------------------------------------
-void StorageBuffer::Reserve(vtkTypeInt64 bytes)
+void TexelBuffer::Reserve(vtkTypeInt64 bytes)
 {
   if (this->Id == 0)
   {
@@ -17,15 +17,14 @@ void StorageBuffer::Reserve(vtkTypeInt64 bytes)
   }
   if (this->Bytes < bytes)
   {
-    glBindBuffer(GL_SHADER_STORAGE_BUFFER, this->Id);
-    glBufferData(
-      GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);
+    glBindBuffer(GL_TEXTURE_BUFFER, this->Id);
+    glBufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);
     this->Bytes = bytes;
   }
 }
 
 //------------------------------------------------------------------------------
-void StorageBuffer::BindTexture(vtkOpenGLState* state, int unit, GLenum format)
+void TexelBuffer::BindTexture(vtkOpenGLState* state, int unit, GLenum format)
 {
   if (this->Texture == 0)
   {
@@ -37,36 +36,51 @@ void StorageBuffer::BindTexture(vtkOpenGLState* state, int unit, GLenum format)
 }
 
 //------------------------------------------------------------------------------
-void StorageBuffer::Fill(vtkTypeInt64 offset, vtkTypeInt64 bytes, GLuint value) const
+void TexelBuffer::BindImage(GLuint unit, GLenum format)
 {
-  glBindBuffer(GL_SHADER_STORAGE_BUFFER, this->Id);
-  glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, static_cast<GLintptr>(offset),
+  if (this->Image == 0)
+  {
+    glGenTextures(1, &this->Image);
+  }
+  glBindTexture(GL_TEXTURE_BUFFER, this->Image);
+  glTexBuffer(GL_TEXTURE_BUFFER, format, this->Id);
+  glBindTexture(GL_TEXTURE_BUFFER, 0);
+  glBindImageTexture(unit, this->Image, 0, GL_FALSE, 0, GL_READ_WRITE, format);
+}
+
+//------------------------------------------------------------------------------
+void TexelBuffer::Fill(vtkTypeInt64 offset, vtkTypeInt64 bytes, GLuint value) const
+{
+  glBindBuffer(GL_TEXTURE_BUFFER, this->Id);
+  glClearBufferSubData(GL_TEXTURE_BUFFER, GL_R32UI, static_cast<GLintptr>(offset),
     static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
 }
 
 //------------------------------------------------------------------------------
-GLuint StorageBuffer::Read(int index) const
+GLuint TexelBuffer::Read(int index) const
 {
   GLuint value = 0;
-  glBindBuffer(GL_SHADER_STORAGE_BUFFER, this->Id);
-  glGetBufferSubData(
-    GL_SHADER_STORAGE_BUFFER, index * GLintptr(sizeof(GLuint)), sizeof(GLuint), &value);
+  glBindBuffer(GL_TEXTURE_BUFFER, this->Id);
+  glGetBufferSubData(GL_TEXTURE_BUFFER, index * GLintptr(sizeof(GLuint)), sizeof(GLuint), &value);
   return value;
 }
 
 //------------------------------------------------------------------------------
-void StorageBuffer::Release()
+void TexelBuffer::Release()
 {
   if (this->Id != 0)
   {
     glDeleteBuffers(1, &this->Id);
   }
-  if (this->Texture != 0)
+  for (GLuint* texture : { &this->Texture, &this->Image })
   {
-    glDeleteTextures(1, &this->Texture);
+    if (*texture != 0)
+    {
+      glDeleteTextures(1, texture);
+      *texture = 0;
+    }
   }
   this->Id = 0;
-  this->Texture = 0;
   this->Bytes = 0;
 }
 

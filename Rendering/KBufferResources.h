@@ -22,21 +22,17 @@ class vtkShaderProgram;
 
 namespace lighttransport
 {
-/** A shader storage buffer, written at a binding and read as a texture buffer. */
-class StorageBuffer
+/** A buffer that shaders write as an image and read as a texture buffer. */
+class TexelBuffer
 {
 public:
-  explicit StorageBuffer(GLuint binding)
-    : Binding(binding)
-  {
-  }
-  StorageBuffer(const StorageBuffer&) = delete;
-  StorageBuffer& operator=(const StorageBuffer&) = delete;
+  TexelBuffer() = default;
+  TexelBuffer(const TexelBuffer&) = delete;
+  TexelBuffer& operator=(const TexelBuffer&) = delete;
 
   /** At least so many bytes; what was in it is lost where it grows. */
   void Reserve(vtkTypeInt64 bytes);
-  void Bind() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, this->Binding, this->Id); }
-  void Unbind() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, this->Binding, 0); }
+  void BindImage(GLuint unit, GLenum format);
   void BindTexture(vtkOpenGLState* state, int unit, GLenum format);
   void Fill(vtkTypeInt64 offset, vtkTypeInt64 bytes, GLuint value) const;
   GLuint Read(int index) const;
@@ -45,9 +41,9 @@ public:
   vtkTypeInt64 Bytes = 0;
 
 private:
-  GLuint Binding;
   GLuint Id = 0;
   GLuint Texture = 0;
+  GLuint Image = 0;
 };
 
 /** A compute shader. */

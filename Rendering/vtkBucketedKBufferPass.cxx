@@ -690,7 +690,7 @@ vtkTypeInt64 vtkBucketedKBufferPass::GetNumberOfMergedFragments()
       self.Buffer.Window->MakeCurrent();
       glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
       self.Merged = self.Buffer.Counter.Read(KBuffer::FragmentsMerged);
-      glBindBuffer(GL_SHADER_STORAGE_BUFFER, 0);
+      glBindBuffer(GL_TEXTURE_BUFFER, 0);
     }
   }
   return self.Merged;

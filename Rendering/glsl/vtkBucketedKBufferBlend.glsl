@@ -5,7 +5,7 @@
 // of a quad over the viewport. Defined before: vtkBucketedKBufferRead.glsl,
 // vtkBucketedKBufferList.glsl. The output is premultiplied.
 
-layout(std430, binding = 4) coherent buffer ltCounterBlock { uint ltCounter[]; };
+layout(r32ui, binding = 4) coherent uniform uimageBuffer ltCounter;
 
 in vec2 texCoord;
 uniform ivec2 ltSize; // of the viewport, in pixels
@@ -35,7 +35,7 @@ void main()
     vec4 tail = ltTailLayer();
     color += transparency * tail.a * tail.rgb;
     transparency *= 1.0 - tail.a;
-    atomicAdd(ltCounter[2], ltTailCount);
+    imageAtomicAdd(ltCounter, 2, ltTailCount);
   }
   vec4 result = vec4(color, 1.0 - transparency);
 #if LT_READ_TARGET

@@ -3,7 +3,7 @@
 //
 // vtkBucketedKBufferPass: curvature of a surface at a fragment, from its neighbours
 // (as Vergne et al. 2009, but in VC lengths). Defined before:
-// vtkBucketedKBufferPixel.glsl; LT_FIND (1: neighbours are looked up), then LT_ROOM, LT_EACH.
+// vtkBucketedKBufferPixel.glsl.
 
 uniform float ltCurvatureScale; // s, a length
 uniform sampler2D ltParameters; // row: style; vtkCurvatureOpacityProperty::GetParameters
@@ -31,60 +31,14 @@ const ivec2 ltSides[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(
 
 ivec4 ltFirsts; // fragments of the pixels at ltSides
 
-#if LT_FIND
-// By the pixel's own i: i + 1 in the pixels on the left and below. The search looks right
-// and up only.
-uint ltLeft[LT_ROOM];
-uint ltBelow[LT_ROOM];
-#endif
-
 void ltLookAround(ivec2 p)
 {
-#if LT_FIND
-#define LT_ITEM(i) ltLeft[i] = ltBelow[i] = 0u;
-  LT_EACH
-#undef LT_ITEM
-#endif
-  uvec2 pixels[4];
   for (int side = 0; side < 4; ++side)
   {
-    ivec2 q = clamp(p + ltSides[side], ivec2(0, ltRows.x), ivec2(ltSize.x, ltRows.y) - 1);
-    pixels[side] = texelFetch(ltPixels, q.y * ltSize.x + q.x).xy;
-    ltFirsts[side] = int(pixels[side].x);
+    ivec2 q = clamp(p + ltSides[side], ivec2(0), ltSize - 1);
+    ltFirsts[side] = int(texelFetch(ltPixels, q.y * ltSize.x + q.x).x);
   }
-#if LT_FIND
-  uint j = 0u;
-  uint count = p.x > 0 ? uint(ltFragments(pixels[2])) : 0u;
-  while (j < count)
-  {
-    uint right = texelFetch(ltNeighbors, ltFirsts[2] + int(j)).x & 255u;
-    ++j;
-    if (right > 0u)
-    {
-      ltLeft[right - 1u] = j;
-    }
-  }
-  j = 0u;
-  count = p.y > ltRows.x ? uint(ltFragments(pixels[3])) : 0u;
-  while (j < count)
-  {
-    uint up = (texelFetch(ltNeighbors, ltFirsts[3] + int(j)).x >> 8u) & 255u;
-    ++j;
-    if (up > 0u)
-    {
-      ltBelow[up - 1u] = j;
-    }
-  }
-#endif
 }
-
-#if LT_FIND
-// i + 1 of the neighbours: right | up << 8 | left << 16 | below << 24; 0: missing.
-uint ltNeighborsOf(uint first, uint i)
-{
-  return texelFetch(ltNeighbors, int(first + i)).x | ltLeft[i] << 16u | ltBelow[i] << 24u;
-}
-#endif
 
 bool ltComplete(uint neighbors)
 {

@@ -10,27 +10,21 @@
 //   ltColor[node]    RGBA, not premultiplied, half or float
 //   ltSurface[node]  x: style << 24 | shape, y: outward normal in VC (LT_NO_NORMAL: none)
 
-layout(std430, binding = 0) coherent buffer ltHeadBlock { uint ltHead[]; };
-layout(std430, binding = 1) buffer ltLinkBlock { uvec2 ltLink[]; };
+// Buffers behind images: Mesa's llvmpipe writes those many times faster than storage buffers,
+// which are also limited in size.
+
+layout(r32ui, binding = 0) coherent uniform uimageBuffer ltHead;
+layout(rg32ui, binding = 1) uniform uimageBuffer ltLink;
 #if LT_FLOAT_COLOR
-layout(std430, binding = 2) buffer ltColorBlock { uvec4 ltColor[]; };
+layout(rgba32f, binding = 2) writeonly uniform imageBuffer ltColor;
 #else
-layout(std430, binding = 2) buffer ltColorBlock { uvec2 ltColor[]; };
+layout(rgba16f, binding = 2) writeonly uniform imageBuffer ltColor;
 #endif
 #if LT_STYLE
-layout(std430, binding = 3) buffer ltSurfaceBlock { uvec2 ltSurface[]; };
+layout(rg32ui, binding = 3) writeonly uniform uimageBuffer ltSurface;
 #endif
 // 0: nodes asked for, 1: fragments in pixels' lists, 2: fragments merged into tails
-layout(std430, binding = 4) coherent buffer ltCounterBlock { uint ltCounter[]; };
-
-void ltSetColor(uint node, vec4 color)
-{
-#if LT_FLOAT_COLOR
-  ltColor[node] = floatBitsToUint(color);
-#else
-  ltColor[node] = uvec2(packHalf2x16(color.rg), packHalf2x16(color.ba));
-#endif
-}
+layout(r32ui, binding = 4) coherent uniform uimageBuffer ltCounter;
 
 // Unit vectors on an octahedron, 16 bits a coordinate (Cigolle et al. 2014).
 uint ltPackNormal(vec3 n)

@@ -2,23 +2,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // vtkBucketedKBufferPass, neighbour stage (compute): each fragment's neighbour on
-// the same surface in the pixels right and above. Of the fragments i of a pixel and j of
+// the same surface in the pixels around. Of the fragments i of a pixel and j of
 // the next one in the bucket of their shape,
 //   epsilon(i, j) = (1 - n_i . n_j) + |z_i - z_j|^2,   z in footprints of a pixel
 // (Carnecky et al. 2013; Murray et al. 2016). i and j are neighbours if each is the
-// other's best (the reverse check). Defined before: vtkBucketedKBufferPixel.glsl, LT_ROOM.
+// other's best (the reverse check). One thread looks right and up, and writes both
+// ends. Defined before: vtkBucketedKBufferPixel.glsl, LT_ROOM.
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 1) writeonly buffer ltNeighborBlock { uint ltNeighbor[]; };
+layout(r8ui, binding = 5) writeonly uniform uimageBuffer ltNeighbor; // its bytes
 
 float ltBackError[LT_ROOM]; // of the other pixel's fragments: their best so far
 int ltBack[LT_ROOM];
 int ltForth[LT_ROOM];
-uint ltFound[LT_ROOM];
 
 // Loops test at their end: SIMD machines run a body once more, for nothing, where the
 // test comes first.
-void ltMatch(uvec2 here, uvec2 there, uint shift)
+void ltMatch(uvec2 here, uvec2 there, int side)
 {
   int first = int(here.x);
   int count = ltFragments(here);
@@ -85,8 +85,11 @@ void ltMatch(uvec2 here, uvec2 there, uint shift)
       do
       {
         int j = ltForth[i];
-        bool mutual = j >= 0 && ltBack[max(j, 0)] == i;
-        ltFound[i] |= mutual ? uint(j + 1) << shift : 0u;
+        if (j >= 0 && ltBack[max(j, 0)] == i)
+        {
+          imageStore(ltNeighbor, 4 * (first + i) + side, uvec4(j + 1));
+          imageStore(ltNeighbor, 4 * (firstThere + j) + side + 2, uvec4(i + 1));
+        }
         ++i;
       } while (i <= range.y);
     }
@@ -103,26 +106,13 @@ void main()
   }
   int pixel = row * ltSize.x + column;
   uvec2 here = texelFetch(ltPixels, pixel).xy;
-  if (here.y == 0u)
-  {
-    return;
-  }
-#define LT_ITEM(i) ltFound[i] = 0u;
-  LT_EACH
-#undef LT_ITEM
   for (int side = 0; side < 2; ++side)
   {
     bool inside = side == 0 ? column + 1 < ltSize.x : row + 1 < ltRows.y;
     uvec2 there = texelFetch(ltPixels, inside ? pixel + (side == 0 ? 1 : ltSize.x) : pixel).xy;
-    if (inside && there.y > 0u)
+    if (inside && here.y > 0u && there.y > 0u)
     {
-      ltMatch(here, there, uint(side) * 8u);
+      ltMatch(here, there, side);
     }
   }
-  int i = 0;
-  do
-  {
-    ltNeighbor[int(here.x) + i] = ltFound[i];
-    ++i;
-  } while (i < ltFragments(here));
 }

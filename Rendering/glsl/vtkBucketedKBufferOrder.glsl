@@ -7,11 +7,12 @@
 // vtkBucketedKBufferPixel.glsl, vtkBucketedKBufferList.glsl, LT_SINGLE_BUCKET.
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 4) coherent buffer ltCounterBlock { uint ltCounter[]; };
-layout(std430, binding = 5) writeonly buffer ltPixelBlock { uvec4 ltPixel[]; };
-layout(std430, binding = 6) writeonly buffer ltRecordBlock { uvec2 ltRecord[]; };
-layout(std430, binding = 7) writeonly buffer ltNodeBlock { uint ltNode[]; };
-layout(std430, binding = 0) writeonly buffer ltBucketBlock { uint ltBucket[]; };
+layout(rgba32ui, binding = 0) writeonly uniform uimageBuffer ltPixel;
+layout(rg32ui, binding = 1) writeonly uniform uimageBuffer ltRecord;
+layout(r32ui, binding = 2) writeonly uniform uimageBuffer ltNode;
+layout(r32ui, binding = 3) writeonly uniform uimageBuffer ltBucket;
+layout(r32ui, binding = 4) coherent uniform uimageBuffer ltCounter;
+layout(r32ui, binding = 5) writeonly uniform uimageBuffer ltNeighbor;
 
 uniform int ltLayers;
 
@@ -30,12 +31,12 @@ void main()
   uint first = 0u;
   if (ltCount > 0)
   {
-    first = atomicAdd(ltCounter[1], uint(ltCount));
+    first = imageAtomicAdd(ltCounter, 1, uint(ltCount));
   }
   uvec2 tail = uvec2(0u);
   if (ltTailCount > 0u)
   {
-    atomicAdd(ltCounter[2], ltTailCount);
+    imageAtomicAdd(ltCounter, 2, ltTailCount);
     vec4 layer = ltTailLayer();
     tail = uvec2(packHalf2x16(layer.rg), packHalf2x16(layer.ba));
   }
@@ -71,17 +72,19 @@ void main()
       uint key = ltKeys[i];
       uint of = key & 63u;
       uint node = ltNodes[of];
-      ltRecord[first + i] =
-        uvec2(floatBitsToUint(ltDepthDCToZ(ltDepths[of] >> 1u)), ltGetSurface(node).y);
-      ltNode[first + of] = node | i << 26u;
+      int at = int(first + i);
+      imageStore(ltRecord, at,
+        uvec4(floatBitsToUint(ltDepthDCToZ(ltDepths[of] >> 1u)), ltGetSurface(node).y, 0u, 0u));
+      imageStore(ltNode, int(first + of), uvec4(node | i << 26u));
+      imageStore(ltNeighbor, at, uvec4(0u));
       if (key >> 6u != before)
       {
-        ltBucket[first + buckets] = (key & ~63u) | i;
+        imageStore(ltBucket, int(first + buckets), uvec4((key & ~63u) | i));
         ++buckets;
         before = key >> 6u;
       }
       ++i;
     } while (i < uint(ltCount));
   }
-  ltPixel[pixel] = uvec4(first, uint(ltCount) | buckets << 8u, tail);
+  imageStore(ltPixel, int(pixel), uvec4(first, uint(ltCount) | buckets << 8u, tail));
 }

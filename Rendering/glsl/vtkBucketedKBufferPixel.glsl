@@ -12,7 +12,7 @@
 //                        normal in VC
 //   ltBucketList[first+b] in order of shape: shape << 6 | the bucket's first i
 //   ltNeighbors[first+i] i + 1 of the neighbour on the same surface, 0: missing:
-//                        right | up << 8
+//                        right | up << 8 | left << 16 | down << 24
 // A bucket is a range. Murray et al. find it in a hash table, by shape mod k; in order, the
 // buckets of two pixels are found by going along both.
 

@@ -7,7 +7,7 @@
 // would show the mesh. Defined before: vtkBucketedKBufferCurvature.glsl.
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 2) writeonly buffer ltTensorBlock { uvec4 ltTensor[]; };
+layout(rgba32ui, binding = 0) writeonly uniform uimageBuffer ltTensor;
 
 uniform usamplerBuffer ltTensors; // before
 
@@ -40,7 +40,6 @@ void main()
     }
     sum /= max(weight, 1.0);
     rest /= max(weight, 1.0);
-    ltTensor[place] =
-      uvec4(packHalf2x16(sum.xy), packHalf2x16(sum.zw), packHalf2x16(rest), own.w);
+    imageStore(ltTensor, int(place), uvec4(packHalf2x16(sum.xy), packHalf2x16(sum.zw), packHalf2x16(rest), own.w));
   }
 }

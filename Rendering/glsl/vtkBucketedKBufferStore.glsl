@@ -33,18 +33,19 @@ void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
   {
     return;
   }
-  uint node = atomicAdd(ltCounter[0], 1u);
+  uint node = imageAtomicAdd(ltCounter, 0, 1u);
   if (node >= uint(ltCapacity))
   {
     return; // the stage is run again with room for all
   }
   color.a = clamp(color.a, 0.0, 1.0);
   color.rgb = clamp(color.rgb, 0.0, 65504.0); // what half floats hold
-  ltSetColor(node, color);
+  imageStore(ltColor, int(node), color);
 #if LT_STYLE
   shape = (uint(ltShape) + shape) & 0xFFFFFFu;
-  ltSurface[node] = uvec2(uint(ltStyle) << 24u | shape, ltThin != 0 ? LT_NO_NORMAL : normalVC);
+  imageStore(ltSurface, int(node),
+    uvec4(uint(ltStyle) << 24u | shape, ltThin != 0 ? LT_NO_NORMAL : normalVC, 0u, 0u));
 #endif
-  uint next = atomicExchange(ltHead[p.y * ltWidth + p.x], node);
-  ltLink[node] = uvec2(next, floatBitsToUint(depthDC) << 1 | uint(ltThin));
+  uint next = imageAtomicExchange(ltHead, p.y * ltWidth + p.x, node);
+  imageStore(ltLink, int(node), uvec4(next, floatBitsToUint(depthDC) << 1 | uint(ltThin), 0u, 0u));
 }

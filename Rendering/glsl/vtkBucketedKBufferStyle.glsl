@@ -89,7 +89,7 @@ void main()
     ltSurfacePoint s = ltPointAt(p, place);
     vec3 t1;
     vec3 t2;
-    vec3 w = ltShapeOperator(s, p, place, ltNeighborsOf(here.x, i), t1, t2);
+    vec3 w = ltShapeOperator(s, p, place, texelFetch(ltNeighbors, int(place)).x, t1, t2);
     vec4 styled = ltStylise(c, surface.x >> 24u, s, w.x + w.z, p, place);
     c = surface.y == LT_NO_NORMAL ? c : styled;
 

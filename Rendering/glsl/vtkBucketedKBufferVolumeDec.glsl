@@ -18,10 +18,10 @@ int ltNextSurface = 0;
 // The surfaces of the pixel; more than there is room for: the nearest.
 void ltFindSurfaces()
 {
-  uint node = ltHead[int(gl_FragCoord.y) * ltWidth + int(gl_FragCoord.x)];
+  uint node = imageLoad(ltHead, int(gl_FragCoord.y) * ltWidth + int(gl_FragCoord.x)).x;
   while (node != LT_NONE && node < uint(ltCapacity))
   {
-    uvec2 link = ltLink[node];
+    uvec2 link = imageLoad(ltLink, int(node)).xy;
     uint bits = link.y >> 1u;
     int i = ltSurfaces;
     ltSurfaces = min(ltSurfaces + 1, LT_VOLUME_SURFACES);
