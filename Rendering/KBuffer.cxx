@@ -83,7 +83,8 @@ std::vector<TexelBuffer*> KBuffer::All()
 {
   return { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter,
     &this->Pixels, &this->Records, &this->NodeList, &this->Buckets, &this->Neighbors,
-    &this->Tensors, &this->SmoothTensors };
+    &this->Tensors, &this->SmoothTensors, &this->ShadingTable, &this->OpacityTable,
+    &this->ParameterTable };
 }
 
 //------------------------------------------------------------------------------
@@ -97,8 +98,7 @@ void KBuffer::Release(vtkWindow* window)
   this->Match.Release();
   this->Tensor.Release();
   this->Smooth.Release();
-  for (auto* texture : { &this->OpaqueDepth, &this->TargetColor, &this->ShadingTable,
-         &this->OpacityTable, &this->ParameterTable })
+  for (auto* texture : { &this->OpaqueDepth, &this->TargetColor })
   {
     if (*texture)
     {
@@ -248,7 +248,10 @@ void KBuffer::BindForReading(const Uniforms& uniforms)
       Reader{ &this->Buckets, "ltBucketList", GL_R32UI },
       Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
       Reader{
-        this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI } })
+        this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI },
+      Reader{ &this->ShadingTable, "ltShading", GL_RGBA32F },
+      Reader{ &this->OpacityTable, "ltOpacity", GL_RGBA32F },
+      Reader{ &this->ParameterTable, "ltParameters", GL_RGBA32F } })
   {
     if (r.buffer->Bytes > 0 && uniforms.Has(r.name))
     {
@@ -464,14 +467,13 @@ void KBuffer::FillTables()
   {
     now.emplace_back(style, style->GetMTime());
   }
-  if (this->ShadingTable && now == this->Tables)
+  if (this->ShadingTable.Bytes > 0 && now == this->Tables)
   {
     return;
   }
   this->Tables = now;
-  constexpr int Shades = 256;
+  constexpr int Shades = 256; // as in vtkBucketedKBufferStyle.glsl
   constexpr int Opacities = 64;
-  const auto styles = static_cast<unsigned int>(this->Styles.size());
   std::vector<float> shading;
   std::vector<float> opacity;
   std::vector<float> parameters;
@@ -495,25 +497,21 @@ void KBuffer::FillTables()
     vtkNew<vtkImageData> table;
     style->GetOpacityFunction()->ExportTable(table, Opacities, Opacities);
     const auto* values = static_cast<const float*>(table->GetScalarPointer());
-    opacity.insert(opacity.end(), values, values + Opacities * Opacities);
+    for (int y = 0; y + 1 < Opacities; ++y)
+    {
+      for (int x = 0; x + 1 < Opacities; ++x)
+      {
+        const float* corner = values + y * Opacities + x;
+        opacity.insert(
+          opacity.end(), { corner[0], corner[1], corner[Opacities], corner[Opacities + 1] });
+      }
+    }
     const auto row = style->GetParameters();
     parameters.insert(parameters.end(), row.begin(), row.end());
   }
-  const auto upload = [this](vtkSmartPointer<vtkTextureObject>& texture, std::vector<float>& values,
-                        unsigned int height, int components, int filter)
-  {
-    const auto width = static_cast<unsigned int>(values.size()) / height / components;
-    texture = vtkSmartPointer<vtkTextureObject>::New();
-    texture->SetContext(this->Window);
-    texture->Create2DFromRaw(width, height, components, VTK_FLOAT, values.data());
-    texture->SetWrapS(vtkTextureObject::ClampToEdge);
-    texture->SetWrapT(vtkTextureObject::ClampToEdge);
-    texture->SetMinificationFilter(filter);
-    texture->SetMagnificationFilter(filter);
-  };
-  upload(this->ShadingTable, shading, styles, 4, vtkTextureObject::Linear);
-  upload(this->OpacityTable, opacity, styles * Opacities, 1, vtkTextureObject::Linear);
-  upload(this->ParameterTable, parameters, styles, 4, vtkTextureObject::Nearest);
+  this->ShadingTable.Upload(shading);
+  this->OpacityTable.Upload(opacity);
+  this->ParameterTable.Upload(parameters);
 }
 
 //------------------------------------------------------------------------------
@@ -642,8 +640,9 @@ bool KBuffer::Blend(int first, int last)
   const int* size = this->Now.size;
   const int* origin = this->Now.origin;
   this->Counter.BindImage(4, GL_R32UI);
-  const std::string key =
-    this->Defines(this->Room()) + define("LT_READ_TARGET", this->Now.into.plain);
+  const std::string key = this->Defines(this->Room()) +
+    define("LT_READ_TARGET", this->Now.into.plain) + define("LT_SHADE", this->Now.shade) +
+    define("LT_OPACITY", this->Now.opacity) + define("LT_RADIANCE", this->Now.radiance);
   if (!this->Quad || this->QuadKey != key)
   {
     const std::string body = this->Now.style
@@ -697,10 +696,6 @@ bool KBuffer::Blend(int first, int last)
   {
     uniforms.Set("ltCurvatureScale", static_cast<float>(this->Now.curvatureScale));
     uniforms.Set("ltDepthRange", this->DepthRange);
-    uniforms.Set("ltStyles", static_cast<int>(this->Styles.size()));
-    activate("ltShading", this->ShadingTable);
-    activate("ltOpacity", this->OpacityTable);
-    activate("ltParameters", this->ParameterTable);
   }
   this->Quad->Render();
   for (vtkTextureObject* texture : textures)

@@ -51,6 +51,9 @@ public:
     int layers = 16;
     bool style = false;
     bool lines = false;
+    bool shade = false; // whether any style does
+    bool opacity = false;
+    bool radiance = false;
     bool floatColor = false;
     bool singleBucket = false;
     PictureTarget into;
@@ -118,6 +121,9 @@ private:
   TexelBuffer Tensors;
   TexelBuffer SmoothTensors;
   TexelBuffer* LatestTensors = nullptr;
+  TexelBuffer ShadingTable; // see vtkBucketedKBufferStyle.glsl
+  TexelBuffer OpacityTable;
+  TexelBuffer ParameterTable;
   ComputeProgram Order;
   ComputeProgram Match;
   ComputeProgram Tensor;
@@ -128,9 +134,6 @@ private:
   vtkSmartPointer<vtkOpenGLFramebufferObject> GeometryTarget;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
   std::string QuadKey;
-  vtkSmartPointer<vtkTextureObject> ShadingTable;
-  vtkSmartPointer<vtkTextureObject> OpacityTable;
-  vtkSmartPointer<vtkTextureObject> ParameterTable;
   std::vector<std::pair<vtkCurvatureOpacityProperty*, vtkMTimeType>> Tables; // what is in them
   std::vector<int> Units;                                                    // texture units in use
   vtkTypeInt64 MostTexels = 0; // GL_MAX_TEXTURE_BUFFER_SIZE

@@ -49,6 +49,15 @@ void TexelBuffer::BindImage(GLuint unit, GLenum format)
 }
 
 //------------------------------------------------------------------------------
+void TexelBuffer::Upload(const std::vector<float>& values)
+{
+  const auto bytes = static_cast<GLsizeiptr>(values.size() * sizeof(float));
+  this->Reserve(bytes);
+  glBindBuffer(GL_TEXTURE_BUFFER, this->Id);
+  glBufferSubData(GL_TEXTURE_BUFFER, 0, bytes, values.data());
+}
+
+//------------------------------------------------------------------------------
 void TexelBuffer::Fill(vtkTypeInt64 offset, vtkTypeInt64 bytes, GLuint value) const
 {
   glBindBuffer(GL_TEXTURE_BUFFER, this->Id);

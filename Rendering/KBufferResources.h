@@ -16,6 +16,7 @@
 
 #include <array>
 #include <string>
+#include <vector>
 
 class vtkOpenGLState;
 class vtkShaderProgram;
@@ -34,6 +35,7 @@ public:
   void Reserve(vtkTypeInt64 bytes);
   void BindImage(GLuint unit, GLenum format);
   void BindTexture(vtkOpenGLState* state, int unit, GLenum format);
+  void Upload(const std::vector<float>& values);
   void Fill(vtkTypeInt64 offset, vtkTypeInt64 bytes, GLuint value) const;
   GLuint Read(int index) const;
   void Release();

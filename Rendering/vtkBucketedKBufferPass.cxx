@@ -154,12 +154,15 @@ void vtkBucketedKBufferPass::vtkInternals::FindShapes(vtkProp** props, int count
     shapes = std::min<vtkIdType>(std::max<vtkIdType>(shapes, 1), MostShapes - 1);
     this->NextShape = (this->NextShape + static_cast<int>(shapes)) % MostShapes;
   }
-  buffer.Now.style = false;
-  buffer.Now.lines = false;
+  KBuffer::Settings& now = buffer.Now;
+  now.style = now.lines = now.shade = now.opacity = now.radiance = false;
   for (const auto& style : buffer.Styles)
   {
-    buffer.Now.style = buffer.Now.style || style->HasEffect();
-    buffer.Now.lines = buffer.Now.lines || style->HasLines();
+    now.style = now.style || style->HasEffect();
+    now.lines = now.lines || style->HasLines();
+    now.shade = now.shade || style->GetCurvatureShading();
+    now.opacity = now.opacity || style->GetCurvatureOpacity();
+    now.radiance = now.radiance || style->GetRadianceScaling() > 0.;
   }
 }
 

@@ -6,7 +6,7 @@
 // vtkBucketedKBufferPixel.glsl.
 
 uniform float ltCurvatureScale; // s, a length
-uniform sampler2D ltParameters; // row: style; vtkCurvatureOpacityProperty::GetParameters
+uniform samplerBuffer ltParameters; // of a style: 4; vtkCurvatureOpacityProperty::GetParameters
 
 struct ltSurfacePoint
 {

@@ -96,10 +96,10 @@ float ltThird(mat3 wx, mat3 wy, vec3 px, vec3 py, vec3 g)
 // kinds: occluding, suggestive, ridges and valleys, demarcating; widths in pixels, 0: off.
 float ltLineCoverage(ltSurfacePoint s, ivec2 p, int place, uint style)
 {
-  vec4 widths = texelFetch(ltParameters, ivec2(1, int(style)), 0);
+  vec4 widths = texelFetch(ltParameters, 4 * int(style) + 1);
   // The least curvature of a line, and the least change of it, above the normals' rounding.
   float unit = ltFootprintAt(s.position.z) / ltCurvatureScale;
-  float threshold = texelFetch(ltParameters, ivec2(0, int(style)), 0).w;
+  float threshold = texelFetch(ltParameters, 4 * int(style)).w;
   float strength = threshold * unit;
   float change = max(threshold * unit * unit, 2e-5);
   ltFeature f = ltFeatureAt(p, place);

@@ -37,7 +37,6 @@ void ltMatch(uvec2 here, uvec2 there, int side)
     bool same;
     ivec2 range;
     ivec2 rangeThere;
-    do
     {
       same = bucket >> 6u == other >> 6u;
       bool step_ = bucket >> 6u <= other >> 6u;
@@ -51,7 +50,7 @@ void ltMatch(uvec2 here, uvec2 there, int side)
       range.y = b < buckets ? int(bucket & 63u) - 1 : count - 1;
       rangeThere.y = c < bucketsThere ? int(other & 63u) - 1 : countThere - 1;
       more = b < buckets && c < bucketsThere;
-    } while (!same && more);
+    }
     if (same)
     {
       int i = range.x;

@@ -11,10 +11,8 @@ uniform sampler2D ltTarget; // what is behind, premultiplied; else blended by th
 #endif
 
 uniform vec2 ltDepthRange;      // of the function's z: distances of 0 and of 1
-uniform sampler2D ltShading;    // factor of the colour over kappa in [-1,1]; row: style
-uniform sampler2D ltOpacity;    // over |kappa| and z; a block of rows per style
-
-uniform int ltStyles;
+uniform samplerBuffer ltShading; // of a style: factors of the colour at 256 kappas in [-1,1]
+uniform samplerBuffer ltOpacity; // of a style: 63^2 cells over |kappa| and z, four corners each
 
 // -1 convex, 0 flat, 1 concave; a missing neighbour is -1, a contour.
 float ltKappa(bool complete, float trace)
@@ -40,22 +38,31 @@ float ltRadianceScale(float kappa, float delta, float strength)
 
 vec4 ltStylise(vec4 color, uint style, ltSurfacePoint s, float trace, ivec2 p, uint place)
 {
-  float row = (float(style) + 0.5) / float(ltStyles);
-  vec4 switches = texelFetch(ltParameters, ivec2(0, int(style)), 0);
+  vec4 switches = texelFetch(ltParameters, 4 * int(style));
   float kappa = ltKappa(s.complete, trace);
   vec3 result = color.rgb;
   float alpha = color.a;
-  const float last = 255.0 / 256.0;
-  vec3 factor = texture(ltShading, vec2(0.5 / 256.0 + last * (0.5 + 0.5 * kappa), row)).rgb;
+#if LT_SHADE
+  float shade = 255.0 * (0.5 + 0.5 * kappa);
+  int below = min(int(shade), 254);
+  vec3 factor = mix(texelFetch(ltShading, 256 * int(style) + below).rgb,
+    texelFetch(ltShading, 256 * int(style) + below + 1).rgb, shade - float(below));
   result *= switches.x > 0.0 ? factor : vec3(1.0);
+#endif
+#if LT_RADIANCE
   float delta = clamp(abs(dot(s.normal, ltViewVC(s.position))), 0.0, 1.0);
   result *= switches.z > 0.0 ? ltRadianceScale(kappa, delta, switches.z) : 1.0;
-  vec2 at = vec2(abs(kappa), ltDepthOf(s.position.z)) * 63.0 + 0.5;
-  at = vec2(at.x, 64.0 * float(style) + at.y) / vec2(64.0, 64.0 * float(ltStyles));
-  float opacity = texture(ltOpacity, at).r;
-  alpha = switches.y > 0.0 ? opacity : alpha;
+#endif
+#if LT_OPACITY
+  vec2 at = vec2(abs(kappa), ltDepthOf(s.position.z)) * 63.0;
+  ivec2 cell = min(ivec2(at), ivec2(62));
+  vec4 corners = texelFetch(ltOpacity, (63 * int(style) + cell.y) * 63 + cell.x);
+  at -= vec2(cell);
+  vec2 pair = mix(corners.xy, corners.zw, at.y);
+  alpha = switches.y > 0.0 ? mix(pair.x, pair.y, at.x) : alpha;
+#endif
 #if LT_LINES
-  vec4 line = texelFetch(ltParameters, ivec2(2, int(style)), 0);
+  vec4 line = texelFetch(ltParameters, 4 * int(style) + 2);
   float coverage = ltLineCoverage(s, p, int(place), style) * line.a;
   // The line is a layer over this one.
   float lined = coverage + (1.0 - coverage) * alpha;
