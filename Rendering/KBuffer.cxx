@@ -281,7 +281,7 @@ void KBuffer::SetGeometry(const Uniforms& uniforms) const
   uniforms.Set("ltRows", this->Rows);
   uniforms.Set("ltSize", std::array<int, 2>{ this->Now.size[0], this->Now.size[1] });
   uniforms.Set("ltParallel", this->Parallel);
-  uniforms.Set("ltProjection", this->Projection);
+  uniforms.Set("ltPixelToVC", this->PixelToVC);
   uniforms.Set("ltDepthToVC", this->DepthToVC);
   uniforms.Set("ltFootprint", this->Footprint);
 }
@@ -418,7 +418,13 @@ void KBuffer::SetCamera(vtkRenderer* renderer, vtkProp** props, int count)
   this->Parallel = camera->GetParallelProjection() != 0;
   const int column = this->Parallel ? 3 : 2;
   const auto at = [p](int row, int col) { return static_cast<float>(p->GetElement(row, col)); };
-  this->Projection = { at(0, 0), at(1, 1), at(0, column), at(1, column) };
+  const float sign = this->Parallel ? -1.F : 1.F;
+  for (int i = 0; i < 2; ++i)
+  {
+    const auto pixels = static_cast<float>(this->Now.size[i]);
+    this->PixelToVC[i] = 2.F / pixels / at(i, i);
+    this->PixelToVC[i + 2] = (1.F / pixels - 1.F + sign * at(i, column)) / at(i, i);
+  }
   this->DepthToVC = { at(2, 2), at(2, 3) };
   this->Footprint = static_cast<float>(2. / (p->GetElement(1, 1) * this->Now.size[1]));
   vtkMatrix4x4::Invert(p, this->DCToVC);
@@ -492,7 +498,8 @@ void KBuffer::FillTables()
       {
         shading.push_back(static_cast<float>(factor * c));
       }
-      shading.push_back(1.F);
+      shading.push_back(
+        static_cast<float>(style->GetShadingFunction()->GetValue(kappa + 2. / (Shades - 1))));
     }
     vtkNew<vtkImageData> table;
     style->GetOpacityFunction()->ExportTable(table, Opacities, Opacities);
@@ -642,7 +649,9 @@ bool KBuffer::Blend(int first, int last)
   this->Counter.BindImage(4, GL_R32UI);
   const std::string key = this->Defines(this->Room()) +
     define("LT_READ_TARGET", this->Now.into.plain) + define("LT_SHADE", this->Now.shade) +
-    define("LT_OPACITY", this->Now.opacity) + define("LT_RADIANCE", this->Now.radiance);
+    define("LT_OPACITY", this->Now.opacity) + define("LT_RADIANCE", this->Now.radiance) +
+    define("LT_ONE_STYLE", this->Styles.size() == 1) +
+    define("LT_SHADE_COLORS", this->Now.shadeColors);
   if (!this->Quad || this->QuadKey != key)
   {
     const std::string body = this->Now.style

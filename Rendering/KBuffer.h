@@ -52,6 +52,7 @@ public:
     bool style = false;
     bool lines = false;
     bool shade = false; // whether any style does
+    bool shadeColors = false;
     bool opacity = false;
     bool radiance = false;
     bool floatColor = false;
@@ -140,7 +141,7 @@ private:
 
   // the camera, see vtkBucketedKBufferPixel.glsl
   int Parallel = 0;
-  std::array<float, 4> Projection{};
+  std::array<float, 4> PixelToVC{};
   std::array<float, 2> DepthToVC{};
   std::array<float, 2> DepthRange{};
   std::array<int, 2> Rows{}; // of the band

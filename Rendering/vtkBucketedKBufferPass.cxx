@@ -155,12 +155,13 @@ void vtkBucketedKBufferPass::vtkInternals::FindShapes(vtkProp** props, int count
     this->NextShape = (this->NextShape + static_cast<int>(shapes)) % MostShapes;
   }
   KBuffer::Settings& now = buffer.Now;
-  now.style = now.lines = now.shade = now.opacity = now.radiance = false;
+  now.style = now.lines = now.shade = now.shadeColors = now.opacity = now.radiance = false;
   for (const auto& style : buffer.Styles)
   {
     now.style = now.style || style->HasEffect();
     now.lines = now.lines || style->HasLines();
     now.shade = now.shade || style->GetCurvatureShading();
+    now.shadeColors = now.shadeColors || style->GetShadingColors();
     now.opacity = now.opacity || style->GetCurvatureOpacity();
     now.radiance = now.radiance || style->GetRadianceScaling() > 0.;
   }

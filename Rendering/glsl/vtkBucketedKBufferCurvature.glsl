@@ -12,6 +12,7 @@ struct ltSurfacePoint
 {
   vec3 position; // VC
   vec3 normal;   // VC, outward
+  bool styled;   // it has a normal
   bool complete; // all four neighbours are there
   ivec4 at;      // the neighbours' places in ltRecords; -1: missing
 };
@@ -22,6 +23,7 @@ ltSurfacePoint ltPointAt(ivec2 p, uint place)
   uvec2 record = texelFetch(ltRecords, int(place)).xy;
   s.position = ltPositionVC(p, uintBitsToFloat(record.x));
   s.normal = ltUnpackNormal(record.y);
+  s.styled = record.y != LT_NO_NORMAL;
   s.complete = false;
   s.at = ivec4(-1);
   return s;

@@ -25,7 +25,7 @@ uniform usamplerBuffer ltNeighbors;
 uniform ivec2 ltSize;      // of the viewport, in pixels
 uniform ivec2 ltRows;      // first and one past the last that there are fragments of
 uniform int ltParallel;    // 1: parallel projection
-uniform vec4 ltProjection; // x, y: VC to DC, zw: of the projection's centre
+uniform vec4 ltPixelToVC;  // p * xy + zw: at z = -1, or where the projection is parallel
 uniform vec2 ltDepthToVC;  // the last two of the third row of VC to DC
 uniform float ltFootprint; // size of a pixel, at distance 1 if not parallel
 
@@ -48,10 +48,8 @@ float ltDepthDCToZ(uint depthBits)
 
 vec3 ltPositionVC(ivec2 p, float z)
 {
-  vec2 dc = (vec2(p) + 0.5) / vec2(ltSize) * 2.0 - 1.0;
-  vec2 xy = ltParallel != 0 ? (dc - ltProjection.zw) / ltProjection.xy
-                            : -z * (dc + ltProjection.zw) / ltProjection.xy;
-  return vec3(xy, z);
+  vec2 xy = vec2(p) * ltPixelToVC.xy + ltPixelToVC.zw;
+  return vec3(ltParallel != 0 ? xy : -z * xy, z);
 }
 
 // Length of a pixel's side at z.

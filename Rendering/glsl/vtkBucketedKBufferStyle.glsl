@@ -11,8 +11,12 @@ uniform sampler2D ltTarget; // what is behind, premultiplied; else blended by th
 #endif
 
 uniform vec2 ltDepthRange;      // of the function's z: distances of 0 and of 1
-uniform samplerBuffer ltShading; // of a style: factors of the colour at 256 kappas in [-1,1]
+uniform samplerBuffer ltShading; // of a style: factors of RGB at 256 kappas in [-1,1]; A: next R
 uniform samplerBuffer ltOpacity; // of a style: 63^2 cells over |kappa| and z, four corners each
+
+#if LT_ONE_STYLE
+vec4 ltSwitches;
+#endif
 
 // -1 convex, 0 flat, 1 concave; a missing neighbour is -1, a contour.
 float ltKappa(bool complete, float trace)
@@ -38,15 +42,23 @@ float ltRadianceScale(float kappa, float delta, float strength)
 
 vec4 ltStylise(vec4 color, uint style, ltSurfacePoint s, float trace, ivec2 p, uint place)
 {
+#if LT_ONE_STYLE
+  vec4 switches = ltSwitches;
+#else
   vec4 switches = texelFetch(ltParameters, 4 * int(style));
+#endif
   float kappa = ltKappa(s.complete, trace);
   vec3 result = color.rgb;
   float alpha = color.a;
 #if LT_SHADE
   float shade = 255.0 * (0.5 + 0.5 * kappa);
   int below = min(int(shade), 254);
-  vec3 factor = mix(texelFetch(ltShading, 256 * int(style) + below).rgb,
-    texelFetch(ltShading, 256 * int(style) + below + 1).rgb, shade - float(below));
+  vec4 texel = texelFetch(ltShading, 256 * int(style) + below);
+  vec3 factor = vec3(mix(texel.r, texel.a, shade - float(below)));
+#if LT_SHADE_COLORS
+  vec3 next = texelFetch(ltShading, 256 * int(style) + below + 1).rgb;
+  factor = mix(texel.rgb, next, shade - float(below));
+#endif
   result *= switches.x > 0.0 ? factor : vec3(1.0);
 #endif
 #if LT_RADIANCE
@@ -82,6 +94,9 @@ void main()
     discard;
   }
   ltLookAround(p);
+#if LT_ONE_STYLE
+  ltSwitches = texelFetch(ltParameters, 0);
+#endif
   vec3 color = vec3(0.0);
   float transparency = 1.0;
   int count = ltFragments(here.xy);
@@ -92,13 +107,17 @@ void main()
     uint place = here.x + i;
     uint node = item & 0x3FFFFFFu;
     vec4 c = ltGetColor(node);
-    uvec2 surface = ltGetSurface(node);
+#if LT_ONE_STYLE
+    uint style = 0u;
+#else
+    uint style = ltGetSurface(node).x >> 24u;
+#endif
     ltSurfacePoint s = ltPointAt(p, place);
     vec3 t1;
     vec3 t2;
     vec3 w = ltShapeOperator(s, p, place, texelFetch(ltNeighbors, int(place)).x, t1, t2);
-    vec4 styled = ltStylise(c, surface.x >> 24u, s, w.x + w.z, p, place);
-    c = surface.y == LT_NO_NORMAL ? c : styled;
+    vec4 styled = ltStylise(c, style, s, w.x + w.z, p, place);
+    c = s.styled ? styled : c;
 
     color += transparency * c.a * c.rgb;
     transparency *= 1.0 - c.a;
