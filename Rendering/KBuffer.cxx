@@ -528,8 +528,8 @@ void KBuffer::BeginGeometry(int low, int high)
   vtkOpenGLState* state = this->Window->GetState();
   const vtkTypeInt64 width = this->Now.size[0];
   this->Heads.Fill(low * width * 4, (high - low) * width * 4, EndOfList);
-  this->Counter.Fill(4 * NodesAsked, 4, 0);
   this->Counter.Fill(4 * FragmentsListed, 4, 0);
+  this->Counter.Fill(4 * FirstNodeCounter, 4 * (NumberOfCounters - FirstNodeCounter), 0);
   this->Heads.BindImage(0, GL_R32UI);
   this->Links.BindImage(1, GL_RG32UI);
   this->Colors.BindImage(2, this->ColorFormat());
@@ -563,21 +563,29 @@ void KBuffer::BeginVolume()
 }
 
 //------------------------------------------------------------------------------
-vtkTypeInt64 KBuffer::EndGeometry()
+void KBuffer::EndGeometry()
 {
   this->OpaqueDepth->Deactivate();
   this->Window->GetState()->PopFramebufferBindings();
   glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
     GL_TEXTURE_FETCH_BARRIER_BIT);
-  return this->Counter.Read(NodesAsked);
+  this->Fragments = 0;
+  this->NodesAsked = 0;
+  for (int i = 0; i < NodeCounters; ++i)
+  {
+    const vtkTypeInt64 asked = this->Counter.Read(FirstNodeCounter * (1 + i));
+    this->Fragments += asked;
+    const vtkTypeInt64 turns = (asked + NodesInTurn - 1) / NodesInTurn;
+    this->NodesAsked = std::max(this->NodesAsked, turns * NodesInTurn * NodeCounters);
+  }
 }
 
 //------------------------------------------------------------------------------
 /** For rows low to high - 1; what went wrong, or empty. */
-std::string KBuffer::OrderAndMatch(int low, int high, vtkTypeInt64 nodes)
+std::string KBuffer::OrderAndMatch(int low, int high)
 {
   this->Rows = { low, high };
-  const vtkTypeInt64 listed = std::max<vtkTypeInt64>(nodes, 1);
+  const vtkTypeInt64 listed = std::max<vtkTypeInt64>(this->Fragments, 1);
   this->Records.Reserve(listed * 8);
   this->NodeList.Reserve(listed * 4);
   this->Buckets.Reserve(listed * 4);

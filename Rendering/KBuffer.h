@@ -37,10 +37,12 @@ class KBuffer
 public:
   enum Counters
   {
-    NodesAsked = 0,
     FragmentsListed = 1,
     FragmentsMerged = 2,
-    NumberOfCounters = 4
+    FirstNodeCounter = 16, // see vtkBucketedKBufferStore.glsl
+    NodeCounters = 8,
+    NodesInTurn = 64,
+    NumberOfCounters = 16 * (1 + NodeCounters)
   };
 
   /** What a frame is drawn with; set before the stages. */
@@ -80,7 +82,9 @@ public:
   vtkTypeInt64 MostNodes(vtkTypeInt64 memoryLimit) const;
   void ReserveNodes(vtkTypeInt64 nodes);
   void ReleaseNodes();
-  vtkTypeInt64 Capacity = 0; // nodes
+  vtkTypeInt64 Capacity = 0;   // nodes
+  vtkTypeInt64 Fragments = 0;  // of the band
+  vtkTypeInt64 NodesAsked = 0; // room for all of them: some more
 
   int BitsPerFragment() const;
   vtkTypeInt64 Bytes();
@@ -96,12 +100,12 @@ public:
   bool Measure = false;
   std::array<double, 6> Milliseconds{}; // by stage
 
-  double SceneLength = 1.;               // diagonal of what is translucent
-  void BeginGeometry(int low, int high); // 2: clears, binds
-  void BeginVolume();                    // what is there already can be read
-  vtkTypeInt64 EndGeometry();            // how many nodes were asked for
-  std::string OrderAndMatch(int low, int high, vtkTypeInt64 nodes); // 3, 4
-  bool Blend(int first, int last);                                  // 5
+  double SceneLength = 1.;                      // diagonal of what is translucent
+  void BeginGeometry(int low, int high);        // 2: clears, binds
+  void BeginVolume();                           // what is there already can be read
+  void EndGeometry();                           // then Fragments and NodesAsked are known
+  std::string OrderAndMatch(int low, int high); // 3, 4
+  bool Blend(int first, int last);              // 5
   void Unbind();
   TexelBuffer Counter;
 

@@ -480,7 +480,6 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
   const int high = std::min(last + around, buffer.Now.size[1]);
 
   // 2. geometry
-  vtkTypeInt64 nodes = 0;
   while (true)
   {
     buffer.BeginGeometry(low, high);
@@ -490,8 +489,9 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
       buffer.BeginVolume();
       volume->RenderVolumetricGeometry(s->GetRenderer());
     }
-    nodes = buffer.EndGeometry();
+    buffer.EndGeometry();
     ++this->NumberOfGeometryPasses;
+    const vtkTypeInt64 nodes = buffer.NodesAsked;
     if (nodes <= buffer.Capacity)
     {
       break;
@@ -507,21 +507,21 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
     }
     else
     {
-      vtkErrorMacro("A row of " << buffer.Now.size[0] << " pixels has " << nodes
+      vtkErrorMacro("A row of " << buffer.Now.size[0] << " pixels has " << buffer.Fragments
                                 << " fragments, more than MemoryLimit or the GPU has room for ("
                                 << buffer.Capacity << "); some are left out.");
-      nodes = buffer.Capacity;
+      buffer.Fragments = std::min(buffer.Fragments, buffer.Capacity);
       break;
     }
   }
-  this->NumberOfFragments += nodes;
+  this->NumberOfFragments += buffer.Fragments;
   buffer.Mark(2);
   this->NumberOfRenderedProps = translucent->GetNumberOfRenderedProps();
 
   // 3. order, 4. neighbours, 5. blending
   if (buffer.Now.style)
   {
-    const std::string problem = buffer.OrderAndMatch(low, high, nodes);
+    const std::string problem = buffer.OrderAndMatch(low, high);
     if (!problem.empty())
     {
       vtkErrorMacro("A compute shader " << problem);

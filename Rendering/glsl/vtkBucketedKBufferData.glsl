@@ -23,7 +23,8 @@ layout(rgba16f, binding = 2) writeonly uniform imageBuffer ltColor;
 #if LT_STYLE
 layout(rg32ui, binding = 3) writeonly uniform uimageBuffer ltSurface;
 #endif
-// 0: nodes asked for, 1: fragments in pixels' lists, 2: fragments merged into tails
+// 1: fragments in pixels' lists, 2: fragments merged into tails, 16 (1 + t): nodes asked for
+// in tiles of number t.
 layout(r32ui, binding = 4) coherent uniform uimageBuffer ltCounter;
 
 // Unit vectors on an octahedron, 16 bits a coordinate (Cigolle et al. 2014).

@@ -25,6 +25,14 @@ uint ltOutwardNormal(vec3 n)
 }
 #endif
 
+// One counter for all would be waited for; each of 8 hands out 64 nodes in turn.
+uint ltNextNode(ivec2 p)
+{
+  int tile = ((p.x >> 4) + 3 * (p.y >> 4)) & 7;
+  uint n = imageAtomicAdd(ltCounter, 16 * (1 + tile), 1u);
+  return (n >> 6u << 9u) | uint(tile << 6) | (n & 63u);
+}
+
 void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
 {
   ivec2 p = ivec2(gl_FragCoord.xy);
@@ -33,7 +41,7 @@ void ltStore(vec4 color, float depthDC, uint shape, uint normalVC)
   {
     return;
   }
-  uint node = imageAtomicAdd(ltCounter, 0, 1u);
+  uint node = ltNextNode(p);
   if (node >= uint(ltCapacity))
   {
     return; // the stage is run again with room for all
