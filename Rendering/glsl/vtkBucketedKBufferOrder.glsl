@@ -16,6 +16,7 @@ layout(r32ui, binding = 5) writeonly uniform uimageBuffer ltNeighbor;
 
 uniform int ltLayers;
 
+uint ltNormals[LT_ROOM]; // of a rank
 uint ltKeys[LT_ROOM]; // shape << 6 | rank in depth, ordered
 
 void main()
@@ -49,10 +50,12 @@ void main()
     int rank = 0;
     do
     {
+      uvec2 surface = ltGetSurface(ltNodes[rank]);
+      ltNormals[rank] = surface.y;
 #if LT_SINGLE_BUCKET
       uint shape = 0u;
 #else
-      uint shape = ltGetSurface(ltNodes[rank]).x & 0xFFFFFFu;
+      uint shape = surface.x & 0xFFFFFFu;
 #endif
       ltKeys[rank] = shape << 6u | uint(rank);
       ++rank;
@@ -74,7 +77,7 @@ void main()
       uint node = ltNodes[of];
       int at = int(first + i);
       imageStore(ltRecord, at,
-        uvec4(floatBitsToUint(ltDepthDCToZ(ltDepths[of] >> 1u)), ltGetSurface(node).y, 0u, 0u));
+        uvec4(floatBitsToUint(ltDepthDCToZ(ltDepths[of] >> 1u)), ltNormals[of], 0u, 0u));
       imageStore(ltNode, int(first + of), uvec4(node | i << 26u));
       imageStore(ltNeighbor, at, uvec4(0u));
       if (key >> 6u != before)
