@@ -82,9 +82,8 @@ KBuffer::~KBuffer() = default;
 std::vector<TexelBuffer*> KBuffer::All()
 {
   return { &this->Heads, &this->Links, &this->Colors, &this->Surfaces, &this->Counter,
-    &this->Pixels, &this->Records, &this->NodeList, &this->Buckets, &this->Neighbors,
-    &this->Tensors, &this->SmoothTensors, &this->ShadingTable, &this->OpacityTable,
-    &this->ParameterTable };
+    &this->Pixels, &this->Records, &this->NodeList, &this->Buckets, &this->Tensors,
+    &this->SmoothTensors, &this->ShadingTable, &this->OpacityTable, &this->ParameterTable };
 }
 
 //------------------------------------------------------------------------------
@@ -176,7 +175,7 @@ void KBuffer::ReserveNodes(vtkTypeInt64 nodes)
 void KBuffer::ReleaseNodes()
 {
   for (TexelBuffer* buffer : { &this->Links, &this->Colors, &this->Surfaces, &this->Records,
-         &this->NodeList, &this->Buckets, &this->Neighbors, &this->Tensors, &this->SmoothTensors })
+         &this->NodeList, &this->Buckets, &this->Tensors, &this->SmoothTensors })
   {
     buffer->Release();
   }
@@ -187,8 +186,8 @@ void KBuffer::ReleaseNodes()
 int KBuffer::BitsPerFragment() const
 {
   const int list = 32 + 32 + (this->Now.floatColor ? 128 : 64); // next, depth, colour
-  // shape, normal; then z, normal, node, bucket, neighbours
-  const int style = this->Now.style ? 32 + 32 + 32 + 32 + 32 + 32 + 32 : 0;
+  // shape, normal; then z, normal, node, bucket; the neighbours are where next was
+  const int style = this->Now.style ? 32 + 32 + 32 + 32 + 32 + 32 : 0;
   return list + style + (this->Now.lines ? 128 + 128 : 0);
 }
 
@@ -246,7 +245,7 @@ void KBuffer::BindForReading(const Uniforms& uniforms)
       Reader{ &this->Records, "ltRecords", GL_RG32UI },
       Reader{ &this->NodeList, "ltNodeList", GL_R32UI },
       Reader{ &this->Buckets, "ltBucketList", GL_R32UI },
-      Reader{ &this->Neighbors, "ltNeighbors", GL_R32UI },
+      Reader{ &this->Links, "ltNeighbors", GL_R32UI },
       Reader{
         this->LatestTensors ? this->LatestTensors : &this->Tensors, "ltTensors", GL_RGBA32UI },
       Reader{ &this->ShadingTable, "ltShading", GL_RGBA32F },
@@ -589,14 +588,12 @@ std::string KBuffer::OrderAndMatch(int low, int high)
   this->Records.Reserve(listed * 8);
   this->NodeList.Reserve(listed * 4);
   this->Buckets.Reserve(listed * 4);
-  this->Neighbors.Reserve(listed * 4);
   this->Window->GetShaderCache()->ReleaseCurrentShader();
   this->Pixels.BindImage(0, GL_RGBA32UI);
   this->Records.BindImage(1, GL_RG32UI);
   this->NodeList.BindImage(2, GL_R32UI);
   this->Buckets.BindImage(3, GL_R32UI);
   this->Counter.BindImage(4, GL_R32UI);
-  this->Neighbors.BindImage(5, GL_R32UI);
   const std::string head = "#version 430 core\n" + this->Defines(this->Room()) +
     sortingNetwork(this->Room()) + define("LT_SINGLE_BUCKET", this->Now.singleBucket) +
     vtkBucketedKBufferRead + vtkBucketedKBufferPixel;
@@ -623,7 +620,9 @@ std::string KBuffer::OrderAndMatch(int low, int high)
     run(this->Order, 3, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
   if (problem.empty())
   {
-    this->Neighbors.BindImage(5, GL_R8UI);
+    // The lists have been read: their place is the neighbours'.
+    this->Links.Fill(0, this->Fragments * 4, 0);
+    this->Links.BindImage(5, GL_R8UI);
     problem = run(this->Match, 4, vtkBucketedKBufferMatch);
   }
   if (problem.empty() && this->Now.lines)

@@ -114,7 +114,7 @@ public:
 
 private:
   TexelBuffer Heads;
-  TexelBuffer Links;
+  TexelBuffer Links; // then the neighbours
   TexelBuffer Colors;
   TexelBuffer Surfaces;
   // with stylisation
@@ -122,7 +122,6 @@ private:
   TexelBuffer Records;
   TexelBuffer NodeList;
   TexelBuffer Buckets;
-  TexelBuffer Neighbors;
   TexelBuffer Tensors;
   TexelBuffer SmoothTensors;
   TexelBuffer* LatestTensors = nullptr;

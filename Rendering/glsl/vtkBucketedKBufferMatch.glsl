@@ -10,7 +10,7 @@
 // ends. Defined before: vtkBucketedKBufferPixel.glsl, LT_ROOM.
 
 layout(local_size_x = 64) in;
-layout(r8ui, binding = 5) writeonly uniform uimageBuffer ltNeighbor; // its bytes
+layout(r8ui, binding = 5) writeonly uniform uimageBuffer ltNeighbor; // its bytes, 0 before
 
 float ltBackError[LT_ROOM]; // of the other pixel's fragments: their best so far
 int ltBack[LT_ROOM];

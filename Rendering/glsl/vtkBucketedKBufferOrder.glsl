@@ -12,7 +12,6 @@ layout(rg32ui, binding = 1) writeonly uniform uimageBuffer ltRecord;
 layout(r32ui, binding = 2) writeonly uniform uimageBuffer ltNode;
 layout(r32ui, binding = 3) writeonly uniform uimageBuffer ltBucket;
 layout(r32ui, binding = 4) coherent uniform uimageBuffer ltCounter;
-layout(r32ui, binding = 5) writeonly uniform uimageBuffer ltNeighbor;
 
 uniform int ltLayers;
 
@@ -79,7 +78,6 @@ void main()
       imageStore(ltRecord, at,
         uvec4(floatBitsToUint(ltDepthDCToZ(ltDepths[of] >> 1u)), ltNormals[of], 0u, 0u));
       imageStore(ltNode, int(first + of), uvec4(node | i << 26u));
-      imageStore(ltNeighbor, at, uvec4(0u));
       if (key >> 6u != before)
       {
         imageStore(ltBucket, int(first + buckets), uvec4((key & ~63u) | i));

@@ -359,7 +359,7 @@ void testOpacity(Suite& suite)
   same.pass->GetCurvatureOpacityProperty()->SetShadingFunction(one);
   same.pass->GetCurvatureOpacityProperty()->CurvatureShadingOn();
   LT_CHECK(suite, largestDifference(plain, same.capture()) <= 1);
-  LT_CHECK(suite, same.pass->GetBitsPerFragment() == 352);
+  LT_CHECK(suite, same.pass->GetBitsPerFragment() == 320);
 }
 } // namespace
 
