@@ -543,11 +543,18 @@ void KBuffer::BeginGeometry(int low, int high)
   state->vtkglViewport(0, 0, this->Now.size[0], this->Now.size[1]);
   state->vtkglEnable(GL_SCISSOR_TEST);
   state->vtkglScissor(0, low, this->Now.size[0], high - low);
+  this->ResetMasks();
+  this->OpaqueDepth->Activate();
+}
+
+//------------------------------------------------------------------------------
+void KBuffer::ResetMasks()
+{
+  vtkOpenGLState* state = this->Window->GetState();
   state->vtkglDisable(GL_DEPTH_TEST);
   state->vtkglDisable(GL_BLEND);
   state->vtkglDepthMask(GL_FALSE);
   state->vtkglColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  this->OpaqueDepth->Activate();
 }
 
 //------------------------------------------------------------------------------
@@ -657,6 +664,7 @@ bool KBuffer::Blend(int first, int last)
   const std::string key = this->Defines(this->Room()) +
     define("LT_READ_TARGET", this->Now.into.plain) + define("LT_SHADE", this->Now.shade) +
     define("LT_OPACITY", this->Now.opacity) + define("LT_RADIANCE", this->Now.radiance) +
+    define("LT_WRITE_DEPTH", this->Now.writeDepth) +
     define("LT_ONE_STYLE", this->Styles.size() == 1) +
     define("LT_SHADE_COLORS", this->Now.shadeColors);
   if (!this->Quad || this->QuadKey != key)
@@ -712,6 +720,13 @@ bool KBuffer::Blend(int first, int last)
   {
     uniforms.Set("ltCurvatureScale", static_cast<float>(this->Now.curvatureScale));
     uniforms.Set("ltDepthRange", this->DepthRange);
+    if (this->Now.writeDepth)
+    {
+      activate("ltOpaqueDepth", this->OpaqueDepth);
+      state->vtkglEnable(GL_DEPTH_TEST);
+      state->vtkglDepthFunc(GL_ALWAYS);
+      state->vtkglDepthMask(GL_TRUE);
+    }
   }
   this->Quad->Render();
   for (vtkTextureObject* texture : textures)

@@ -58,6 +58,7 @@ public:
     bool opacity = false;
     bool radiance = false;
     bool floatColor = false;
+    bool writeDepth = false; // of opaque layers
     bool singleBucket = false;
     PictureTarget into;
     int smoothing = 0; // of the curvature, for lines
@@ -102,6 +103,7 @@ public:
 
   double SceneLength = 1.;                      // diagonal of what is translucent
   void BeginGeometry(int low, int high);        // 2: clears, binds
+  void ResetMasks();                            // that nothing but the lists is written
   void BeginVolume();                           // what is there already can be read
   void EndGeometry();                           // then Fragments and NodesAsked are known
   std::string OrderAndMatch(int low, int high); // 3, 4

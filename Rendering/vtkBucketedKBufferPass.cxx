@@ -23,6 +23,8 @@
 #include "vtkOpenGLActor.h"
 #include "vtkOpenGLError.h"
 #include "vtkOpenGLGPUVolumeRayCastMapper.h"
+#include "vtkOpenGLHelper.h"
+#include "vtkOpenGLPolyDataMapper.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLRenderer.h"
 #include "vtkOpenGLState.h"
@@ -41,6 +43,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -51,6 +54,26 @@ namespace
 {
 constexpr int MostShapes = 1 << 24;
 constexpr std::size_t MostStyles = 255;
+
+/** Set without vtkObject::Modified, which an application may answer by rendering again. */
+struct ActorAccess : vtkActor
+{
+  static void setForceTranslucent(vtkActor* actor, bool on)
+  {
+    actor->*(&ActorAccess::ForceTranslucent) = on;
+  }
+};
+
+struct MapperAccess : vtkOpenGLPolyDataMapper
+{
+  /** Whether lines or points are being drawn. */
+  static bool drawsThin(vtkOpenGLPolyDataMapper* mapper)
+  {
+    const vtkOpenGLHelper* drawn = mapper->*(&MapperAccess::LastBoundBO);
+    return drawn && drawn->PrimitiveType != PrimitiveTris &&
+      drawn->PrimitiveType != PrimitiveTriStrips;
+  }
+};
 } // namespace
 
 //------------------------------------------------------------------------------
@@ -90,6 +113,10 @@ public:
 
   vtkSmartPointer<vtkRenderPass> VolumetricPass; // of the steps, VTK's
   std::vector<vtkProp*> Volumes;                 // that are drawn among the surfaces, this frame
+  std::vector<vtkActor*> Taken;                  // opaque ones that are stylised, this frame
+  std::vector<vtkProp*> Strangers;               // of these, whose shaders are not ours
+  int Shadings = 0;                              // calls of SetShaderParameters
+  int Rendered = 0;                              // props, in the geometry stage
 
   // between frames
   int Bands = 1;
@@ -103,6 +130,9 @@ public:
   }
   void FindShapes(vtkProp** props, int count);
   void FindVolumes(vtkProp** props, int count);
+  void TakeOpaque(vtkProp** props, int count);
+  void GiveBackOpaque();
+  void DrawGeometry(const vtkRenderState* s, bool first);
 };
 
 vtkStandardNewMacro(vtkBucketedKBufferPass::vtkTranslucentStep);
@@ -188,6 +218,95 @@ void vtkBucketedKBufferPass::vtkInternals::FindVolumes(vtkProp** props, int coun
   {
     this->Volumes.clear();
   }
+}
+
+//------------------------------------------------------------------------------
+/** Opaque surfaces of a style with effect are drawn as layers in this frame. */
+void vtkBucketedKBufferPass::vtkInternals::TakeOpaque(vtkProp** props, int count)
+{
+  vtkNew<vtkPropCollection> actors;
+  for (int i = 0; i < count; ++i)
+  {
+    props[i]->GetActors(actors);
+  }
+  vtkCollectionSimpleIterator it;
+  actors->InitTraversal(it);
+  while (vtkProp* prop = actors->GetNextProp(it))
+  {
+    auto* actor = vtkActor::SafeDownCast(prop);
+    vtkMapper* mapper = actor ? actor->GetMapper() : nullptr;
+    if (!mapper || actor->GetForceOpaque() || actor->GetForceTranslucent() ||
+      actor->GetProperty()->GetRepresentation() != VTK_SURFACE || !actor->HasOpaqueGeometry() ||
+      actor->HasTranslucentPolygonalGeometry())
+    {
+      continue;
+    }
+    auto* own = vtkCurvatureOpacityPolyDataMapper::SafeDownCast(mapper);
+    const bool styled =
+      (own ? own->GetCurvatureOpacityProperty() : this->Property.Get())->HasEffect();
+    auto* data = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(0, 0));
+    if (styled && (!data || data->GetNumberOfPolys() + data->GetNumberOfStrips() > 0))
+    {
+      ActorAccess::setForceTranslucent(actor, true);
+      this->Taken.push_back(actor);
+    }
+  }
+}
+
+//------------------------------------------------------------------------------
+void vtkBucketedKBufferPass::vtkInternals::GiveBackOpaque()
+{
+  for (vtkActor* actor : this->Taken)
+  {
+    ActorAccess::setForceTranslucent(actor, false);
+  }
+  this->Taken.clear();
+}
+
+//------------------------------------------------------------------------------
+/**
+ * Props of other classes than vtkActor's are drawn one by one at first: where none of our
+ * shaders is used, the prop gives its parts no property keys, and VTK has to draw it.
+ */
+void vtkBucketedKBufferPass::vtkInternals::DrawGeometry(const vtkRenderState* s, bool first)
+{
+  std::vector<vtkProp*> props;
+  std::vector<vtkProp*> single;
+  for (int i = 0; i < s->GetPropArrayCount(); ++i)
+  {
+    vtkProp* prop = s->GetPropArray()[i];
+    const bool known =
+      prop->IsA("vtkAssembly") || !std::strcmp(prop->GetClassName(), "vtkOpenGLActor");
+    if (first && !known && prop->HasTranslucentPolygonalGeometry())
+    {
+      single.push_back(prop);
+    }
+    else if (std::find(this->Strangers.begin(), this->Strangers.end(), prop) ==
+      this->Strangers.end())
+    {
+      props.push_back(prop);
+    }
+  }
+  vtkRenderState some(s->GetRenderer());
+  some.SetFrameBuffer(s->GetFrameBuffer());
+  some.SetRequiredKeys(s->GetRequiredKeys());
+  some.SetPropArrayAndCount(props.data(), static_cast<int>(props.size()));
+  this->TranslucentPass->Render(&some);
+  int rendered = this->TranslucentPass->GetNumberOfRenderedProps();
+  for (vtkProp* prop : single)
+  {
+    this->Buffer.ResetMasks();
+    some.SetPropArrayAndCount(&prop, 1);
+    const int before = this->Shadings;
+    this->TranslucentPass->Render(&some);
+    const int drawn = this->TranslucentPass->GetNumberOfRenderedProps();
+    rendered += drawn;
+    if (drawn > 0 && this->Shadings == before)
+    {
+      this->Strangers.push_back(prop);
+    }
+  }
+  this->Rendered = rendered;
 }
 
 //------------------------------------------------------------------------------
@@ -280,10 +399,19 @@ void vtkBucketedKBufferPass::RenderEverything(const vtkRenderState* s)
     return;
   }
   vtkInternals& self = *this->Internals;
+  self.TakeOpaque(s->GetPropArray(), s->GetPropArrayCount());
   self.FindVolumes(s->GetPropArray(), s->GetPropArrayCount());
+  if (self.Volumes.empty() &&
+    std::any_of(s->GetPropArray(), s->GetPropArray() + s->GetPropArrayCount(),
+      [](vtkProp* prop) { return prop->IsA("vtkVolume"); }))
+  {
+    // VTK draws the volumes after all layers, in front of what is opaque.
+    self.GiveBackOpaque();
+  }
   self.Steps->SetVolumetricPass(self.Volumes.empty() ? self.VolumetricPass.Get() : nullptr);
   self.Steps->Render(s);
   self.Volumes.clear();
+  self.GiveBackOpaque();
   this->NumberOfRenderedProps = self.Steps->GetNumberOfRenderedProps();
 }
 
@@ -369,6 +497,8 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
     return;
   }
   now.layers = this->NumberOfLayers;
+  now.writeDepth = !self.Taken.empty();
+  self.Strangers.clear();
   now.floatColor = this->ColorPrecision == Float;
   now.singleBucket = this->SingleBucket;
   now.smoothing = this->LineSmoothing;
@@ -387,77 +517,88 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
     self.ShaderTime.Modified();
   }
 
-  vtkOpenGLState* state = window->GetState();
-  vtkOpenGLState::ScopedglViewport viewportSaver(state);
-  vtkOpenGLState::ScopedglScissor scissorSaver(state);
-  vtkOpenGLState::ScopedglEnableDisable scissorTestSaver(state, GL_SCISSOR_TEST);
-  vtkOpenGLState::ScopedglEnableDisable depthTestSaver(state, GL_DEPTH_TEST);
-  vtkOpenGLState::ScopedglEnableDisable blendSaver(state, GL_BLEND);
-  vtkOpenGLState::ScopedglEnableDisable multisampleSaver(state, GL_MULTISAMPLE);
-  vtkOpenGLState::ScopedglEnableDisable cullSaver(state, GL_CULL_FACE);
-  vtkOpenGLState::ScopedglBlendFuncSeparate blendFunctionSaver(state);
-  vtkOpenGLState::ScopedglDepthMask depthMaskSaver(state);
-  vtkOpenGLState::ScopedglColorMask colorMaskSaver(state);
-  state->vtkglDisable(GL_MULTISAMPLE);
-
-  // 1. what is there already
-  buffer.Measure = this->MeasureStages;
-  buffer.Milliseconds.fill(0.);
-  buffer.Mark(0);
-  buffer.CopyTarget();
-  buffer.Mark(1);
-  const vtkTypeInt64 most = buffer.MostNodes(this->MemoryLimit);
-  if (buffer.Capacity > most)
   {
-    buffer.ReleaseNodes();
-  }
-  buffer.ReserveNodes(
-    std::min(most, std::max(buffer.Capacity, vtkTypeInt64(now.size[0]) * now.size[1] * 2 + 1024)));
+    vtkOpenGLState* state = window->GetState();
+    vtkOpenGLState::ScopedglViewport viewportSaver(state);
+    vtkOpenGLState::ScopedglScissor scissorSaver(state);
+    vtkOpenGLState::ScopedglEnableDisable scissorTestSaver(state, GL_SCISSOR_TEST);
+    vtkOpenGLState::ScopedglEnableDisable depthTestSaver(state, GL_DEPTH_TEST);
+    vtkOpenGLState::ScopedglEnableDisable blendSaver(state, GL_BLEND);
+    vtkOpenGLState::ScopedglEnableDisable multisampleSaver(state, GL_MULTISAMPLE);
+    vtkOpenGLState::ScopedglEnableDisable cullSaver(state, GL_CULL_FACE);
+    vtkOpenGLState::ScopedglBlendFuncSeparate blendFunctionSaver(state);
+    vtkOpenGLState::ScopedglDepthMask depthMaskSaver(state);
+    vtkOpenGLState::ScopedglDepthFunc depthFuncSaver(state);
+    vtkOpenGLState::ScopedglColorMask colorMaskSaver(state);
+    state->vtkglDisable(GL_MULTISAMPLE);
 
-  for (int i = 0; i < numberOfProps; ++i)
-  {
-    // vtkOpenGLActor leaves the depth mask alone.
-    vtkInformation* keys = props[i]->GetPropertyKeys();
-    if (!keys)
+    // 1. what is there already
+    buffer.Measure = this->MeasureStages;
+    buffer.Milliseconds.fill(0.);
+    buffer.Mark(0);
+    buffer.CopyTarget();
+    buffer.Mark(1);
+    const vtkTypeInt64 most = buffer.MostNodes(this->MemoryLimit);
+    if (buffer.Capacity > most)
     {
-      vtkNew<vtkInformation> made;
-      props[i]->SetPropertyKeys(made);
-      keys = made;
+      buffer.ReleaseNodes();
     }
-    keys->Set(vtkOpenGLActor::GLDepthMaskOverride(), -1);
-  }
-  this->PreRender(s);
+    buffer.ReserveNodes(std::min(
+      most, std::max(buffer.Capacity, vtkTypeInt64(now.size[0]) * now.size[1] * 2 + 1024)));
 
-  // As many bands as the last frame needed; one that has no room is halved.
-  std::vector<std::array<int, 2>> bands;
-  const int startBands = std::min(self.Bands, now.size[1]);
-  for (int b = startBands; b > 0; --b)
-  {
-    bands.push_back({ static_cast<int>(vtkTypeInt64(now.size[1]) * (b - 1) / startBands),
-      static_cast<int>(vtkTypeInt64(now.size[1]) * b / startBands) });
-  }
-  while (!bands.empty())
-  {
-    const std::array<int, 2> band = bands.back();
-    bands.pop_back();
-    if (this->RenderBand(s, band[0], band[1]))
+    for (int i = 0; i < numberOfProps; ++i)
     {
-      ++this->NumberOfBands;
-      continue;
+      // vtkOpenGLActor leaves the depth mask alone.
+      vtkInformation* keys = props[i]->GetPropertyKeys();
+      if (!keys)
+      {
+        vtkNew<vtkInformation> made;
+        props[i]->SetPropertyKeys(made);
+        keys = made;
+      }
+      keys->Set(vtkOpenGLActor::GLDepthMaskOverride(), -1);
     }
-    const int middle = (band[0] + band[1]) / 2;
-    bands.push_back({ middle, band[1] });
-    bands.push_back({ band[0], middle });
-  }
-  self.Bands = std::max(this->NumberOfBands, 1);
-  self.Merged = -1;
+    this->PreRender(s);
 
-  this->PostRender(s);
-  for (int i = 0; i < numberOfProps; ++i)
-  {
-    props[i]->GetPropertyKeys()->Remove(vtkOpenGLActor::GLDepthMaskOverride());
+    // As many bands as the last frame needed; one that has no room is halved.
+    std::vector<std::array<int, 2>> bands;
+    const int startBands = std::min(self.Bands, now.size[1]);
+    for (int b = startBands; b > 0; --b)
+    {
+      bands.push_back({ static_cast<int>(vtkTypeInt64(now.size[1]) * (b - 1) / startBands),
+        static_cast<int>(vtkTypeInt64(now.size[1]) * b / startBands) });
+    }
+    while (!bands.empty())
+    {
+      const std::array<int, 2> band = bands.back();
+      bands.pop_back();
+      if (this->RenderBand(s, band[0], band[1]))
+      {
+        ++this->NumberOfBands;
+        continue;
+      }
+      const int middle = (band[0] + band[1]) / 2;
+      bands.push_back({ middle, band[1] });
+      bands.push_back({ band[0], middle });
+    }
+    self.Bands = std::max(this->NumberOfBands, 1);
+    self.Merged = -1;
+
+    this->PostRender(s);
+    for (int i = 0; i < numberOfProps; ++i)
+    {
+      props[i]->GetPropertyKeys()->Remove(vtkOpenGLActor::GLDepthMaskOverride());
+    }
+    buffer.Unbind();
   }
-  buffer.Unbind();
+  if (!self.Strangers.empty())
+  {
+    vtkRenderState others(renderer);
+    others.SetFrameBuffer(s->GetFrameBuffer());
+    others.SetRequiredKeys(s->GetRequiredKeys());
+    others.SetPropArrayAndCount(self.Strangers.data(), static_cast<int>(self.Strangers.size()));
+    self.TranslucentPass->Render(&others);
+  }
   if (!self.FailedTag.empty())
   {
     vtkErrorMacro("A shader has no " << self.FailedTag << " (VTK " << vtkVersion::GetVTKVersion()
@@ -473,7 +614,7 @@ void vtkBucketedKBufferPass::RenderTranslucent(const vtkRenderState* s)
 bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int last)
 {
   KBuffer& buffer = this->Internals->Buffer;
-  vtkRenderPass* translucent = this->Internals->TranslucentPass;
+  vtkInternals& self = *this->Internals;
   // More rows on either side, for neighbours, and for the neighbours' neighbours.
   const int around = buffer.Now.style ? (buffer.Now.lines ? 2 + buffer.Now.smoothing : 1) : 0;
   const int low = std::max(first - around, 0);
@@ -483,7 +624,7 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
   while (true)
   {
     buffer.BeginGeometry(low, high);
-    translucent->Render(s);
+    self.DrawGeometry(s, this->NumberOfGeometryPasses == 0);
     for (vtkProp* volume : this->Internals->Volumes)
     {
       buffer.BeginVolume();
@@ -516,7 +657,7 @@ bool vtkBucketedKBufferPass::RenderBand(const vtkRenderState* s, int first, int 
   }
   this->NumberOfFragments += buffer.Fragments;
   buffer.Mark(2);
-  this->NumberOfRenderedProps = translucent->GetNumberOfRenderedProps();
+  this->NumberOfRenderedProps = self.Rendered;
 
   // 3. order, 4. neighbours, 5. blending
   if (buffer.Now.style)
@@ -635,9 +776,12 @@ bool vtkBucketedKBufferPass::SetShaderParameters(vtkShaderProgram* program,
   program->SetUniformi("ltWidth", buffer.Now.size[0]);
   program->SetUniformi("ltCapacity", static_cast<int>(buffer.Capacity));
 
+  ++self.Shadings;
+  auto* polyData = vtkOpenGLPolyDataMapper::SafeDownCast(mapper);
   auto* actor = vtkActor::SafeDownCast(prop);
-  program->SetUniformi(
-    "ltThin", actor && actor->GetProperty()->GetRepresentation() != VTK_SURFACE ? 1 : 0);
+  const bool thin = (actor && actor->GetProperty()->GetRepresentation() != VTK_SURFACE) ||
+    (polyData && MapperAccess::drawsThin(polyData));
+  program->SetUniformi("ltThin", thin ? 1 : 0);
   if (!buffer.Now.style)
   {
     return true;

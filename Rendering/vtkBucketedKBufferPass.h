@@ -32,17 +32,16 @@
  *    all that these can do (textures, vertex colours, edges, physically based
  *    shading, clipping); each fragment becomes a node of its pixel's list. If
  *    the nodes do not fit, the buffers grow and the stage is run again; if they
- *    fit into no buffer (GL_MAX_SHADER_STORAGE_BLOCK_SIZE, MemoryLimit), the
+ *    fit into no buffer (GL_MAX_TEXTURE_BUFFER_SIZE, MemoryLimit), the
  *    viewport is drawn in as many horizontal bands as needed;
  * 3. order (compute): the NumberOfLayers nearest nodes of each pixel are sorted by
- *    depth, what is behind them is merged into one layer; with stylisation they are
- *    then ordered by shape, and the buckets of the shapes are entered in the pixel's
- *    hash table;
+ *    depth (Batcher's network), what is behind them is merged into one layer; with
+ *    stylisation they are then ordered by shape, and the shapes' buckets are listed;
  * 4. neighbours (compute, with stylisation only): in the four pixels around, the
  *    fragment of the same shape with the least
  *      epsilon = (1 - n . n') + |z - z'|^2,   z in footprints of a pixel
- *    if each is the other's best. Only the shape's bucket is searched. For lines, the
- *    curvature tensors too;
+ *    if each is the other's best. Only the shape's bucket is searched, found by going
+ *    along the two pixels' lists at once. For lines, the curvature tensors too;
  * 5. blending: curvature from the neighbours and stylisation
  *    (vtkCurvatureOpacityProperty), then front to back "over" (Porter and Duff 1984).
  *
@@ -68,8 +67,19 @@
  * has more pixels than a buffer can hold, it says so once and lets
  * vtkDualDepthPeelingPass draw, with as many layers.
  *
- * Lines and points are in the same lists, without a second look at a point or an
- * edge that several triangles of a wireframe draw.
+ * Lines and points (cells as well as representations) are layers at their own depth, with
+ * their width and opacity, and have no curvature. A point or an edge that several triangles
+ * of a wireframe draw counts once; so do thin fragments of one pixel within four units in
+ * the last place of their depth.
+ *
+ * Opaque actors that are to be stylised are drawn as layers of opacity 1, and write their
+ * depth: see vtkCurvatureOpacityProperty. Without stylisation VTK draws them, and where a
+ * volume is there that cannot be among the surfaces.
+ *
+ * Other props take part if they give their parts their property keys, as VTK's text and
+ * image slices do (vtkImageSlice::ForceTranslucentOn; VTK draws other slices with what is
+ * opaque). Those that do not are drawn after the layers, in front of them, by the
+ * TranslucentPass. 2-D actors are drawn by VTK.
  *
  * Physically based and image-based shading are the mapper's and work as they are; tone
  * mapping takes the sequence above; ambient occlusion of the opaque surfaces is
@@ -83,6 +93,8 @@
  * each hides what is behind it. For mappers that are vtkOpenGLGPUVolumeRayCastMapper
  * (ours too) with an ImageSampleDistance of 1; with any other, volumes are drawn after
  * the surfaces as VTK does by default. N surfaces in a volume are up to 2 N + 1 layers.
+ * Several volumes may lie behind one another; where two overlap, the segments of each are
+ * in order, but one is drawn over the other as a whole between two surfaces.
  *
  * Not for: antialiasing (like VTK's own translucent passes it samples once per pixel).
  * Hardware selection is VTK's own.

@@ -14,8 +14,8 @@
  *   mapper->GetCurvatureOpacityProperty()->CurvatureOpacityOn();
  * @endcode
  *
- * Without such a pass, and for opaque actors (vtkActor::ForceTranslucentOn makes
- * them take part), it is its superclass. Any other mapper can be drawn by the pass
+ * Without such a pass it is its superclass. An opaque actor takes part where its property
+ * has an effect (see vtkCurvatureOpacityProperty). Any other mapper can be drawn by the pass
  * too: its actor, or each block of a composite, is then one shape with the pass's
  * property.
  *

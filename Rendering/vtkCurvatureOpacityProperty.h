@@ -30,8 +30,11 @@
  *
  * 4. lines, a layer over this one
  *
- * Points and wireframes have no curvature and stay as they are. Opaque actors take part
- * after vtkActor::ForceTranslucentOn.
+ * Points, lines and wireframes have no curvature and stay as they are.
+ *
+ * Opaque actors take part too, as layers of opacity 1, where the pass is the renderer's own;
+ * vtkActor::ForceOpaqueOn keeps one out of it. In somebody else's sequence of passes the
+ * opaque step comes first: there vtkActor::ForceTranslucentOn lets one take part.
  *
  * @sa vtkBucketedKBufferPass vtkCurvatureOpacityPolyDataMapper
  */

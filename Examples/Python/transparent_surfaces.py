@@ -323,6 +323,7 @@ def actors_of(parts, opacity):
         actor.SetMapper(mapper)
         actor.GetProperty().SetColor(*color)
         actor.GetProperty().SetOpacity(1.0 if opaque else opacity)
+        actor.SetForceOpaque(opaque)  # or else it would be stylised too
         actor.GetProperty().SetSpecular(0.2)
         actor.GetProperty().SetSpecularPower(30.0)
         result.append(actor)
@@ -475,8 +476,7 @@ def lines_of(name, source, camera):
         style.SetSuggestiveContours(i == 1)
         style.SetRidgesAndValleys(i == 2)
         style.SetDemarcatingCurves(i == 3)
-        for actor in actors_of([(source, (0.9, 0.9, 0.85), True)], 1.0):
-            actor.ForceTranslucentOn()  # opaque ones take part so
+        for actor in actors_of([(source, (0.9, 0.9, 0.85))], 1.0):
             renderer.AddActor(actor)
         view_from(renderer, camera)
         window.AddRenderer(renderer)

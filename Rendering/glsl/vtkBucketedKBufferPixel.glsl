@@ -46,6 +46,13 @@ float ltDepthDCToZ(uint depthBits)
                          : -ltDepthToVC.y / (zDC + ltDepthToVC.x);
 }
 
+float ltZToDepthDC(float z)
+{
+  float zDC = ltParallel != 0 ? z * ltDepthToVC.x + ltDepthToVC.y
+                              : -ltDepthToVC.y / z - ltDepthToVC.x;
+  return clamp(0.5 * zDC + 0.5, 0.0, 1.0);
+}
+
 vec3 ltPositionVC(ivec2 p, float z)
 {
   vec2 xy = vec2(p) * ltPixelToVC.xy + ltPixelToVC.zw;

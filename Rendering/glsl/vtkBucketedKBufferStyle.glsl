@@ -6,6 +6,9 @@
 // vtkBucketedKBufferLines.glsl too).
 
 in vec2 texCoord;
+#if LT_WRITE_DEPTH
+uniform sampler2D ltOpaqueDepth; // DC; becomes that of the nearest opaque layer
+#endif
 #if LT_READ_TARGET
 uniform sampler2D ltTarget; // what is behind, premultiplied; else blended by the machine
 #endif
@@ -99,6 +102,9 @@ void main()
 #endif
   vec3 color = vec3(0.0);
   float transparency = 1.0;
+#if LT_WRITE_DEPTH
+  float depth = texelFetch(ltOpaqueDepth, p, 0).r;
+#endif
   int count = ltFragments(here.xy);
   for (int rank = 0; rank < count; ++rank)
   {
@@ -119,6 +125,9 @@ void main()
     vec4 styled = ltStylise(c, style, s, w.x + w.z, p, place);
     c = s.styled ? styled : c;
 
+#if LT_WRITE_DEPTH
+    depth = c.a > 0.998 ? min(depth, ltZToDepthDC(s.position.z)) : depth;
+#endif
     color += transparency * c.a * c.rgb;
     transparency *= 1.0 - c.a;
   }
@@ -128,6 +137,9 @@ void main()
   vec4 result = vec4(color, 1.0 - transparency);
 #if LT_READ_TARGET
   result += transparency * texelFetch(ltTarget, p, 0);
+#endif
+#if LT_WRITE_DEPTH
+  gl_FragDepth = depth;
 #endif
   gl_FragData[0] = result;
 }
