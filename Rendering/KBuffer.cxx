@@ -93,7 +93,8 @@ void KBuffer::Release(vtkWindow* window)
   {
     buffer->Release();
   }
-  this->Order.Release();
+  this->Order[0].Release();
+  this->Order[1].Release();
   this->Match.Release();
   this->Tensor.Release();
   this->Smooth.Release();
@@ -114,8 +115,8 @@ void KBuffer::Release(vtkWindow* window)
     }
   }
   this->OpaqueDepthFormat = -1;
-  this->Quad.reset();
-  this->QuadKey.clear();
+  this->Quads[0].reset();
+  this->Quads[1].reset();
   this->Tables.clear();
   this->Capacity = 0;
   this->MostTexels = 0;
@@ -219,6 +220,14 @@ int KBuffer::Room() const
     room *= 2;
   }
   return room;
+}
+
+//------------------------------------------------------------------------------
+/** 1 where the pixels' lists are long: a third of the room on average, as measured. */
+int KBuffer::Dense() const
+{
+  const vtkTypeInt64 pixels = vtkTypeInt64(this->Now.size[0]) * (this->Rows[1] - this->Rows[0]);
+  return 3 * this->Fragments > this->Room() * pixels ? 1 : 0;
 }
 
 //------------------------------------------------------------------------------
@@ -526,6 +535,7 @@ void KBuffer::BeginGeometry(int low, int high)
 {
   vtkOpenGLState* state = this->Window->GetState();
   const vtkTypeInt64 width = this->Now.size[0];
+  this->Rows = { low, high };
   this->Heads.Fill(low * width * 4, (high - low) * width * 4, EndOfList);
   this->Counter.Fill(4 * FragmentsListed, 4, 0);
   this->Counter.Fill(4 * FirstNodeCounter, 4 * (NumberOfCounters - FirstNodeCounter), 0);
@@ -590,7 +600,6 @@ void KBuffer::EndGeometry()
 /** For rows low to high - 1; what went wrong, or empty. */
 std::string KBuffer::OrderAndMatch(int low, int high)
 {
-  this->Rows = { low, high };
   const vtkTypeInt64 listed = std::max<vtkTypeInt64>(this->Fragments, 1);
   this->Records.Reserve(listed * 8);
   this->NodeList.Reserve(listed * 4);
@@ -602,8 +611,9 @@ std::string KBuffer::OrderAndMatch(int low, int high)
   this->Buckets.BindImage(3, GL_R32UI);
   this->Counter.BindImage(4, GL_R32UI);
   const std::string head = "#version 430 core\n" + this->Defines(this->Room()) +
-    sortingNetwork(this->Room()) + define("LT_SINGLE_BUCKET", this->Now.singleBucket) +
-    vtkBucketedKBufferRead + vtkBucketedKBufferPixel;
+    sortingNetwork(this->Room()) + define("LT_DENSE", this->Dense()) +
+    define("LT_SINGLE_BUCKET", this->Now.singleBucket) + vtkBucketedKBufferRead +
+    vtkBucketedKBufferPixel;
   const auto run = [&](ComputeProgram& program, int stage, const std::string& body)
   {
     std::string problem = program.Use(head + body);
@@ -623,8 +633,8 @@ std::string KBuffer::OrderAndMatch(int low, int high)
     this->Mark(stage);
     return problem;
   };
-  std::string problem =
-    run(this->Order, 3, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
+  std::string problem = run(
+    this->Order[this->Dense()], 3, std::string(vtkBucketedKBufferList) + vtkBucketedKBufferOrder);
   if (problem.empty())
   {
     // The lists have been read: their place is the neighbours'.
@@ -661,13 +671,14 @@ bool KBuffer::Blend(int first, int last)
   const int* size = this->Now.size;
   const int* origin = this->Now.origin;
   this->Counter.BindImage(4, GL_R32UI);
+  std::unique_ptr<vtkOpenGLQuadHelper>& quad = this->Quads[this->Dense()];
   const std::string key = this->Defines(this->Room()) +
     define("LT_READ_TARGET", this->Now.into.plain) + define("LT_SHADE", this->Now.shade) +
     define("LT_OPACITY", this->Now.opacity) + define("LT_RADIANCE", this->Now.radiance) +
-    define("LT_WRITE_DEPTH", this->Now.writeDepth) +
+    define("LT_DENSE", this->Dense()) + define("LT_WRITE_DEPTH", this->Now.writeDepth) +
     define("LT_ONE_STYLE", this->Styles.size() == 1) +
     define("LT_SHADE_COLORS", this->Now.shadeColors);
-  if (!this->Quad || this->QuadKey != key)
+  if (!quad || this->QuadKeys[this->Dense()] != key)
   {
     const std::string body = this->Now.style
       ? std::string(vtkBucketedKBufferPixel) + std::string(vtkBucketedKBufferCurvature) +
@@ -675,15 +686,14 @@ bool KBuffer::Blend(int first, int last)
       : std::string(vtkBucketedKBufferList) + vtkBucketedKBufferBlend;
     const std::string source = std::string("//VTK::System::Dec\n") + vtkBucketedKBufferExtensions +
       "//VTK::Output::Dec\n" + key + sortingNetwork(this->Room()) + vtkBucketedKBufferRead + body;
-    this->Quad =
-      std::make_unique<vtkOpenGLQuadHelper>(this->Window, nullptr, source.c_str(), nullptr);
-    this->QuadKey = key;
+    quad = std::make_unique<vtkOpenGLQuadHelper>(this->Window, nullptr, source.c_str(), nullptr);
+    this->QuadKeys[this->Dense()] = key;
   }
   else
   {
-    this->Window->GetShaderCache()->ReadyShaderProgram(this->Quad->Program);
+    this->Window->GetShaderCache()->ReadyShaderProgram(quad->Program);
   }
-  vtkShaderProgram* program = this->Quad->Program;
+  vtkShaderProgram* program = quad->Program;
   if (!program)
   {
     return false;
@@ -728,7 +738,7 @@ bool KBuffer::Blend(int first, int last)
       state->vtkglDepthMask(GL_TRUE);
     }
   }
-  this->Quad->Render();
+  quad->Render();
   for (vtkTextureObject* texture : textures)
   {
     texture->Deactivate();

@@ -130,7 +130,7 @@ private:
   TexelBuffer ShadingTable; // see vtkBucketedKBufferStyle.glsl
   TexelBuffer OpacityTable;
   TexelBuffer ParameterTable;
-  ComputeProgram Order;
+  ComputeProgram Order[2]; // for short lists, for long ones
   ComputeProgram Match;
   ComputeProgram Tensor;
   ComputeProgram Smooth;
@@ -138,8 +138,8 @@ private:
   vtkSmartPointer<vtkOpenGLFramebufferObject> DepthTarget;
   vtkSmartPointer<vtkTextureObject> TargetColor;
   vtkSmartPointer<vtkOpenGLFramebufferObject> GeometryTarget;
-  std::unique_ptr<vtkOpenGLQuadHelper> Quad;
-  std::string QuadKey;
+  std::unique_ptr<vtkOpenGLQuadHelper> Quads[2]; // likewise
+  std::string QuadKeys[2];
   std::vector<std::pair<vtkCurvatureOpacityProperty*, vtkMTimeType>> Tables; // what is in them
   std::vector<int> Units;                                                    // texture units in use
   vtkTypeInt64 MostTexels = 0; // GL_MAX_TEXTURE_BUFFER_SIZE
@@ -156,6 +156,7 @@ private:
 
   std::vector<TexelBuffer*> All();
   int Room() const;
+  int Dense() const;
   GLenum ColorFormat() const;
   void CopyDepth();
   void CopyColor();

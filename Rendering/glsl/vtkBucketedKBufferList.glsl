@@ -11,7 +11,8 @@
 // sums are integers.
 //
 // Loops hold as few fetches as can be: a SIMD machine runs both sides of an if. Fixed
-// places of an array are fast everywhere, computed ones are not: thence the network.
+// places of an array are fast everywhere, computed ones are not: thence the network. But it
+// takes its time where there is nothing to sort too: only with LT_DENSE, for long lists.
 
 uint ltDepths[LT_ROOM]; // bits of the depth in DC << 1 | thin: floats >= 0 sort as their bits do
 uint ltNodes[LT_ROOM];
@@ -72,23 +73,23 @@ bool ltContentBefore(uint a, uint b)
 void ltGather(uint pixel, int layers)
 {
   uint head = ltGetHead(pixel);
-  if (head == LT_NONE)
-  {
-    return;
-  }
-  // 1. As many as there is room for, then in order by a network.
+  uint nearestLeft = 0xFFFFFFFFu; // of those that had no room
+  bool tie = false;
+  bool again = false; // see 4
+  uint node = head;
+#if LT_DENSE
+  // 1. As many as there is room for, in order by a network.
 #define LT_ITEM(i) ltDepths[i] = 0xFFFFFFFFu;
   LT_EACH
 #undef LT_ITEM
-  uint node = head;
-  do
+  while (node != LT_NONE && ltCount < LT_ROOM)
   {
     uvec2 link = ltGetLink(node);
     ltDepths[ltCount] = link.y;
     ltNodes[ltCount] = node;
     ++ltCount;
     node = link.x;
-  } while (node != LT_NONE && ltCount < LT_ROOM);
+  }
 #define LT_EXCHANGE(i, j)                                                                          \
   {                                                                                                \
     uint a = ltDepths[i], b = ltDepths[j], m = ltNodes[i], n = ltNodes[j];                         \
@@ -100,34 +101,52 @@ void ltGather(uint pixel, int layers)
   }
   LT_NETWORK
 #undef LT_EXCHANGE
+  if (ltCount > layers)
+  {
+    nearestLeft = ltDepths[layers];
+    ltCount = layers;
+  }
+  uint before = 0xFFFFFFFFu;
+#define LT_ITEM(i)                                                                                 \
+  tie = tie || (i < ltCount && ltDepths[i] == before);                                             \
+  again = again || (i < ltCount && (ltDepths[i] & before & 1u) == 1u);                             \
+  before = ltDepths[i];
+  LT_EACH
+#undef LT_ITEM
+#endif
 
-  // 2. The others, by insertion; what there is no room for is left.
-  uint nearestLeft = 0xFFFFFFFFu;
+  // The nearest by depth, by insertion: short lists, and what the network has left.
   while (node != LT_NONE)
   {
     uvec2 link = ltGetLink(node);
-    uint last = ltDepths[LT_ROOM - 1];
-    uint depth = min(last, link.y);
-    uint inserted = link.y < last ? node : ltNodes[LT_ROOM - 1];
-    nearestLeft = min(nearestLeft, max(last, link.y));
-    int i = LT_ROOM - 1;
+    uint depth = link.y;
+    if (ltCount == layers)
+    {
+      --ltCount;
+      uint last = ltDepths[ltCount];
+      nearestLeft = min(nearestLeft, max(last, depth));
+      if (depth >= last)
+      {
+        depth = last;
+        node = ltNodes[ltCount];
+      }
+    }
+    int i = ltCount;
     while (i > 0 && depth < ltDepths[i - 1])
     {
       ltDepths[i] = ltDepths[i - 1];
       ltNodes[i] = ltNodes[i - 1];
       --i;
     }
+    tie = tie || (i > 0 && depth == ltDepths[i - 1]);
+    again = again || (depth & 1u) == 1u;
     ltDepths[i] = depth;
-    ltNodes[i] = inserted;
+    ltNodes[i] = node;
+    ++ltCount;
     node = link.x;
   }
-  if (ltCount > layers)
-  {
-    nearestLeft = min(nearestLeft, ltDepths[layers]);
-    ltCount = layers;
-  }
 
-  // 3. The tail: all that are not nearer than the nearest left out.
+  // 2. The tail: all that are not nearer than the nearest left out.
   if (nearestLeft != 0xFFFFFFFFu)
   {
     while (ltCount > 0 && ltDepths[ltCount - 1] == nearestLeft)
@@ -145,16 +164,7 @@ void ltGather(uint pixel, int layers)
     node = link.x;
   }
 
-  // 4. Equal depths by content.
-  bool tie = false;
-  bool again = false; // see 5
-  uint before = 0xFFFFFFFFu;
-#define LT_ITEM(i)                                                                                 \
-  tie = tie || (i < ltCount && ltDepths[i] == before);                                             \
-  again = again || (i < ltCount && (ltDepths[i] & before & 1u) == 1u && ltDepths[i] - before <= 8u); \
-  before = ltDepths[i];
-  LT_EACH
-#undef LT_ITEM
+  // 3. Equal depths by content.
   int count = tie ? ltCount : 0;
   for (int j = 1; j < count; ++j)
   {
@@ -168,7 +178,7 @@ void ltGather(uint pixel, int layers)
     ltNodes[i] = node;
   }
 
-  // 5. VTK draws a wireframe's edge for each of its triangles, a point likewise: the
+  // 4. VTK draws a wireframe's edge for each of its triangles, a point likewise: the
   // same fragment again and again, but for the rounding of its depth.
   if (again)
   {

@@ -43,9 +43,11 @@ void main()
   uint buckets = 0u;
   if (ltCount > 0)
   {
+#if LT_DENSE
 #define LT_ITEM(i) ltKeys[i] = 0xFFFFFFFFu;
     LT_EACH
 #undef LT_ITEM
+#endif
     int rank = 0;
     do
     {
@@ -56,9 +58,19 @@ void main()
 #else
       uint shape = surface.x & 0xFFFFFFu;
 #endif
-      ltKeys[rank] = shape << 6u | uint(rank);
+      uint key = shape << 6u | uint(rank);
+      int i = rank;
+#if !LT_DENSE
+      while (i > 0 && key < ltKeys[i - 1])
+      {
+        ltKeys[i] = ltKeys[i - 1];
+        --i;
+      }
+#endif
+      ltKeys[i] = key;
       ++rank;
     } while (rank < ltCount);
+#if LT_DENSE
 #define LT_EXCHANGE(i, j)                                                                          \
   {                                                                                                \
     uint a = ltKeys[i], b = ltKeys[j];                                                             \
@@ -67,6 +79,7 @@ void main()
   }
     LT_NETWORK
 #undef LT_EXCHANGE
+#endif
     uint before = 0xFFFFFFFFu;
     uint i = 0u;
     do

@@ -179,6 +179,12 @@ void measureSpeed(const Options& options)
   std::printf("\n%lld fragments, most layers blended %d, merged %lld\n\n",
     static_cast<long long>(pass->GetNumberOfFragments()), pass->GetNumberOfLayers(),
     static_cast<long long>(pass->GetNumberOfMergedFragments()));
+  pass->MeasureStagesOn();
+  views[2].times.clear();
+  views[2].frame(true);
+  std::printf("copy %.0f, geometry %.0f, blending %.0f ms, each waited for, of %.0f\n\n",
+    pass->GetStageMilliseconds(1), pass->GetStageMilliseconds(2), pass->GetStageMilliseconds(5),
+    views[2].times[0]);
 }
 
 //------------------------------------------------------------------------------
