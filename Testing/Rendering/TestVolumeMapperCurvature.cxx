@@ -313,7 +313,7 @@ void dense(Suite& suite)
     shells.opacity->AddPoint(node[0], node[1]);
   }
   lookAlongZ(shells, 32.);
-  shells.mapper->SetSampleDistance(0.2F);
+  shells.mapper->SetSampleDistance(0.5F);
   vtkNew<vtkVolumeCurvatureProperty> along;
   along->SetCurvatureScale(s);
   shells.mapper->SetCurvatureProperty(along);
@@ -356,7 +356,7 @@ void dense(Suite& suite)
   dependent.property->SetScalarOpacity(shells.opacity);
   dependent.property->SetScalarOpacityUnitDistance(1.);
   lookAlongZ(dependent, 32.);
-  dependent.mapper->SetSampleDistance(0.2F);
+  dependent.mapper->SetSampleDistance(0.5F);
   dependent.mapper->SetCurvatureProperty(along);
   LT_CHECK(suite, difference(picture, dependent.capture()).largest <= 2.);
   LT_CHECK(suite, openGLErrors().empty());
@@ -368,7 +368,7 @@ void depth(Suite& suite)
   LitScene scene(volumeOf(slopeOfZ), Size, Size);
   makeWhite(scene, 0.9);
   showIsosurfaces(scene, { 8., 16., 24. });
-  scene.mapper->SetSampleDistance(0.1F);
+  scene.mapper->SetSampleDistance(0.25F);
   vtkNew<vtkVolumeCurvatureProperty> property;
   property->GetOpacityFunction()->SetKindToFrontOpaque();
   property->GetOpacityFunction()->SetMinimumOpacity(0.);
@@ -532,7 +532,7 @@ void turning(Suite& suite)
     Size);
   makeWhite(scene, 0.4);
   showIsosurfaces(scene, { 5., 10. });
-  scene.mapper->SetSampleDistance(0.2F);
+  scene.mapper->SetSampleDistance(0.4F);
   vtkNew<vtkVolumeCurvatureProperty> property;
   property->GetOpacityFunction()->SetKindToWideDepth();
   scene.mapper->SetCurvatureProperty(property);
