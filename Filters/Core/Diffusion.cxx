@@ -30,6 +30,12 @@ constexpr float NoSink = 1e-30f;
 constexpr std::int64_t FirstRegion = 32768;
 constexpr std::int64_t FirstPart = 128;
 
+/** By which seven floats, summed in float, may be more. */
+constexpr double SumInFloat = 1. + 5e-7;
+
+/** Of the largest value: what six decades of a picture do not show. */
+constexpr double Unseen = 1e-7;
+
 /** From this tolerance on, memory counts more than the last few per cent of speed. */
 constexpr double FrugalTolerance = 1e-4;
 
@@ -979,13 +985,13 @@ std::int64_t DiffusionSolver::borderIndex(int d, const int at[3]) const
 //------------------------------------------------------------------------------
 double DiffusionSolver::positivityBound() const
 {
-  return this->largestDiagonal > 0. ? 1. / (this->scale * this->largestDiagonal)
+  return this->largestDiagonal > 0. ? 1. / (this->scale * this->largestDiagonal * SumInFloat)
                                     : std::numeric_limits<double>::max();
 }
 
 double DiffusionSolver::stabilityBound() const
 {
-  return this->gershgorin > 0. ? 2. / (this->scale * this->gershgorin)
+  return this->gershgorin > 0. ? 2. / (this->scale * this->gershgorin * SumInFloat)
                                : std::numeric_limits<double>::max();
 }
 
@@ -1994,6 +2000,7 @@ DiffusionReport DiffusionSolver::solveSteady(
     {
       this->conjugateGradients(b, phi, control, 0., 1., report);
     }
+    this->keepSign(b, phi, control, report);
     darken(); // a closed part without sink may hold any constant: it holds none
     if (singular)
     {
@@ -2399,6 +2406,66 @@ DiffusionReport DiffusionSolver::stepImplicit(
   this->balance(q, phi, report);
   report.seconds = now() - began;
   return report;
+}
+
+//------------------------------------------------------------------------------
+template <class T>
+void DiffusionSolver::keepSign(
+  const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
+{
+  // Where the matrix ties voxels weakly, a small residual says little of their signs.
+  for (int again = 0; again < 3 && report.reason == StopReason::Converged && b.mean == 0.; ++again)
+  {
+    struct Signs
+    {
+      bool above = false, below = false; // sources
+      double least = 0., most = 0.;
+    };
+    std::vector<Signs> rowSigns(static_cast<std::size_t>(this->rows()));
+    ForEachRow(this->A, this->parallelFor,
+      [&](std::int64_t row, std::int64_t o, int n)
+      {
+        Signs& signs = rowSigns[static_cast<std::size_t>(row)];
+        for (std::int64_t i = o; i < o + n; ++i)
+        {
+          signs.above = signs.above || b.q[i] > T(0);
+          signs.below = signs.below || b.q[i] < T(0);
+          signs.least = std::min(signs.least, phi[i]);
+          signs.most = std::max(signs.most, phi[i]);
+        }
+      });
+    Signs all;
+    for (const Signs& signs : rowSigns)
+    {
+      all.above = all.above || signs.above;
+      all.below = all.below || signs.below;
+      all.least = std::min(all.least, signs.least);
+      all.most = std::max(all.most, signs.most);
+    }
+    const double allowed = std::min(control.tolerance, Unseen);
+    const bool kept =
+      all.above ? -all.least <= allowed * all.most : all.most <= allowed * -all.least;
+    if (all.above == all.below || kept)
+    {
+      return;
+    }
+    ForEachRow(this->A, this->parallelFor,
+      [&](std::int64_t, std::int64_t o, int n)
+      {
+        for (std::int64_t i = o; i < o + n; ++i)
+        {
+          phi[i] = all.above ? std::max(phi[i], 0.) : std::min(phi[i], 0.);
+        }
+      });
+    if (this->isConstant)
+    {
+      this->solveConstant(b, phi, control, report);
+    }
+    else
+    {
+      this->conjugateGradients(b, phi, control, 1., 1., report);
+    }
+  }
 }
 
 //------------------------------------------------------------------------------

@@ -275,6 +275,13 @@ private:
   void solveConstant(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
     DiffusionReport& report);
   /**
+   * Where all sources are of one sign, so is the exact answer: what is of the other one beyond
+   * the tolerance or 1e-7 (of the largest |phi|) becomes 0, and the solve goes on from there.
+   */
+  template <class T>
+  void keepSign(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
+    DiffusionReport& report);
+  /**
    * |b - A phi|, and the residual divided by rScale in r where that is asked for; from the
    * medium itself in double, or (not exactly) from the float faces that the solver works with.
    */

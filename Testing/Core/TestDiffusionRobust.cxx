@@ -4,6 +4,7 @@
  * Hard media: the answer's residual is recomputed here, from the equations, and
  * the iterations are bounded. Then what has no answer, and what stops early.
  */
+#include "Core/FirstMoment.h"
 #include "DiffusionScene.h"
 #include "LightTransportTesting.h"
 
@@ -255,12 +256,176 @@ void stops(Suite& suite)
   report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
   LT_CHECK(suite, remaining < report.iterations);
 }
+
+/**
+ * The matrix, column by column, from what an explicit step makes of one lit voxel: symmetric, no
+ * face below 0, no row whose sinks are: an M-matrix, so that light cannot turn negative.
+ */
+void signs(Suite& suite)
+{
+  std::mt19937 random(12);
+  std::cout << "seed 12\n";
+  std::uniform_real_distribution<double> uniform(0., 1.);
+  for (const Boundary boundary : { Boundary::Robin, Boundary::ZeroFlux, Boundary::Absorbing })
+  {
+    DiffusionScene scene({ { 5, 4, 3 } }, { { 1., 0.3, 20. } });
+    scene.boundary = boundary;
+    for (std::size_t i = 0; i < scene.D.size(); ++i)
+    {
+      scene.D[i] = uniform(random) < 0.1 ? 0. : std::pow(10., -8. * uniform(random));
+      scene.sigma_a[i] = uniform(random) < 0.3 ? 0. : std::pow(10., -6. * uniform(random));
+    }
+    DiffusionSolver solver;
+    solver.setMedium(scene.medium());
+    const double cdt = solver.positivityBound();
+    const std::size_t n = scene.q.size();
+    std::vector<std::vector<double>> columns;
+    for (std::size_t i = 0; i < n; ++i)
+    {
+      std::vector<double> phi(n, 0.);
+      phi[i] = 1.;
+      solver.stepExplicit(
+        static_cast<const double*>(nullptr), phi.data(), 1, cdt, DiffusionControl());
+      columns.push_back(phi); // 1 - c dt A
+    }
+    bool symmetric = true;
+    bool positive = true;
+    bool lossy = true;
+    bool connected = false;
+    for (std::size_t i = 0; i < n; ++i)
+    {
+      double sum = 0.;
+      for (std::size_t j = 0; j < n; ++j)
+      {
+        symmetric = symmetric && std::abs(columns[i][j] - columns[j][i]) <= 1e-15;
+        positive = positive && columns[i][j] >= 0.; // off the diagonal: -c dt A
+        connected = connected || (i != j && columns[i][j] > 0.);
+        sum += columns[i][j];
+      }
+      lossy = lossy && sum <= 1. + 1e-14;
+    }
+    LT_CHECK(suite, symmetric);
+    LT_CHECK(suite, positive);
+    LT_CHECK(suite, lossy);
+    LT_CHECK(suite, connected);
+  }
+}
+
+/** Anything at all: what is said to be solved is, and nothing that comes out is not a number. */
+void honest(Suite& suite)
+{
+  const unsigned int seed = 13;
+  std::cout << "seed " << seed << "\n";
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0., 1.);
+  std::uniform_int_distribution<int> length(1, 9);
+  int solved = 0;
+  int refused = 0;
+  double mostNegative = 0.;
+  for (int run = 0; run < 400; ++run)
+  {
+    const auto power = [&](double decades)
+    { return std::pow(10., decades * (2. * uniform(random) - 1.)); };
+    DiffusionScene scene({ { length(random), length(random), length(random) } },
+      { { power(4.), power(4.), power(4.) } });
+    scene.boundary = static_cast<Boundary>(run % 3);
+    const double contrast = 20. * uniform(random);
+    const double absorbing = 10. * uniform(random);
+    const double unit = power(6.);
+    for (std::size_t i = 0; i < scene.q.size(); ++i)
+    {
+      const double kind = uniform(random);
+      // every tenth medium is constant, the others may have walls and denormals
+      scene.D[i] = run % 10 == 0 ? unit
+        : kind < 0.02            ? 0.
+        : kind < 0.04            ? 1e-310
+                                 : unit * std::pow(10., -contrast * uniform(random));
+      scene.sigma_a[i] = run % 10 == 0 ? 0.01 / unit
+        : kind > 0.7                   ? std::pow(10., -absorbing * uniform(random)) / unit
+                                       : 0.;
+      scene.q[i] = uniform(random) < 0.1 ? std::abs(power(30.)) : 0.;
+    }
+    const double tolerance = std::pow(10., -2. - 12. * uniform(random));
+    const DiffusionReport report = scene.solve(tolerance);
+    double least = 0.;
+    double most = 0.;
+    bool finite = true;
+    for (const double phi : scene.phi)
+    {
+      finite = finite && std::isfinite(phi);
+      least = std::min(least, phi);
+      most = std::max(most, phi);
+    }
+    const std::string name = "medium " + std::to_string(run) + ": " + ToString(report.reason);
+    suite.check(finite, name + ", finite", __FILE__, __LINE__);
+    if (report.reason == StopReason::Converged)
+    {
+      ++solved;
+      const bool dark = most == 0.; // without a source
+      const double residual = dark ? 0. : scene.residual();
+      suite.check(residual <= tolerance * (1. + 1e-3) + 1e-15,
+        name + ", but the residual is " + std::to_string(residual / tolerance) + " tolerances",
+        __FILE__, __LINE__);
+      suite.check(-least <= tolerance * most, name + ", positive", __FILE__, __LINE__);
+      mostNegative = std::max(mostNegative, dark ? 0. : -least / (tolerance * most));
+    }
+    refused += report.reason == StopReason::NoSteadyState;
+  }
+  std::cout << solved << " of 400 solved, " << refused
+            << " without a steady state, most negative: " << mostNegative << " tolerances\n";
+  LT_CHECK(suite, solved > 200 && refused > 50);
+}
+
+/** A NaN appears in the field while a solver works on it: it is seen, and never called solved. */
+void notFinite(Suite& suite)
+{
+  const Suite::WithoutTraps quiet;
+  for (const double bad :
+    { std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e308 })
+  {
+    for (int kind = 0; kind < 6; ++kind)
+    {
+      DiffusionScene scene({ { 12, 12, 12 } }, { { 1., 1., 1. } });
+      scene.sigma_a.assign(scene.q.size(), 1e-2);
+      scene.D[5] = kind == 5 ? 1. : 0.3; // 5: constant
+      scene.q[index(scene, 5, 6, 7)] = 1.;
+      DiffusionSolver solver;
+      FirstMomentSolver moment;
+      solver.setMedium(scene.medium());
+      moment.setMedium(scene.medium());
+      DiffusionControl control;
+      control.tolerance = 1e-10;
+      double* phi = scene.phi.data();
+      int calls = 0;
+      control.progress = [&](double)
+      {
+        phi[800] = ++calls == 2 ? bad : phi[800];
+        return true;
+      };
+      const double* q = scene.q.data();
+      const double cdt = 0.5 * solver.positivityBound();
+      const DiffusionReport report = kind == 0 || kind == 5 ? solver.solveSteady(q, phi, control)
+        : kind == 1 ? solver.stepExplicit(q, phi, 5, cdt, control)
+        : kind == 2 ? solver.stepLocal(q, phi, 5, 1., control)
+        : kind == 3 ? solver.stepImplicit(q, phi, 5, cdt, control)
+                    : static_cast<DiffusionReport>(
+                        moment.step(q, phi, 5, 0.5 * moment.courantBound(), control));
+      const std::string name = "kind " + std::to_string(kind) + ", " + std::to_string(bad) + ": " +
+        ToString(report.reason);
+      // what is too large for its square is no number either, where a norm is taken
+      suite.check(report.reason == StopReason::NotFinite, name, __FILE__, __LINE__);
+    }
+  }
+}
 } // namespace
 
 int main(int argc, char* argv[])
 {
   Suite suite(argc, argv);
   Suite::trapFloatingPoint();
+  signs(suite);
+  honest(suite);
+  notFinite(suite);
   hardMedia(suite);
   noAnswer(suite);
   stops(suite);

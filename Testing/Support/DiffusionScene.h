@@ -118,10 +118,10 @@ struct DiffusionScene
               }
               else if (this->boundary == Boundary::Robin)
               {
-                // phi_face from continuity of the current, d = h/2
+                // phi_face = u phi / (1 + u) from continuity of the current, d = h/2; u may be huge
                 const double u = 2. * A * this->D[ci] / (0.5 * h);
-                const double face = u * this->phi[ci] / (1. + u);
-                r -= this->D[ci] * (this->phi[ci] - face) / (0.5 * h) / h;
+                const double drop = this->phi[ci] / (1. + u);
+                r -= this->D[ci] * drop / (0.5 * h) / h;
               }
             }
           }
