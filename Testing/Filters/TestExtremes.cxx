@@ -95,7 +95,12 @@ void media(Suite& suite)
   {
     Pipeline p;
     p.lamp(1.);
+    p.medium->SetGradientScale(2.); // the ball's surface is at the floor
     p.medium->SetBetaFloor(floor);
+    p.medium->Update();
+    double D[2];
+    pointArray(p.medium, "DiffusionCoefficient")->GetRange(D);
+    LT_CHECK_CLOSE(suite, D[0], floor * D[1], 1e-5);
     p.expect(suite, ("beta floor 1e" + std::to_string(std::lround(std::log10(floor)))).c_str());
   }
   for (const double albedo : { 0., 0.5, 1. - 1e-7 })
