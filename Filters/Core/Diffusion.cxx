@@ -30,6 +30,11 @@ constexpr float NoSink = 1e-30f;
 constexpr std::int64_t FirstRegion = 32768;
 constexpr std::int64_t FirstPart = 128;
 
+/** Explicit steps on so many values go through the memory together, where nobody need be asked. */
+constexpr std::int64_t SeveralStepsFrom = std::int64_t(1) << 19;
+constexpr std::int64_t AskedInTimeUpTo = std::int64_t(1) << 24;
+constexpr int StepsInOnePass = 4;
+
 /** By which seven floats, summed in float, may be more. */
 constexpr double SumInFloat = 1. + 5e-7;
 
@@ -2523,37 +2528,67 @@ DiffusionReport DiffusionSolver::march(
   Buffer<double> other(size);
   report.bytes =
     this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
-  double* from = phi;
-  double* to = other.data();
+  double* fields[2] = { phi, other.data() };
+  int at = 0; // the field that phi's last state is in
   const double step = local ? length : length * this->scale;
   double seen = began;
+  // What does not fit the cache goes several steps in one pass over the memory. Nobody is asked
+  // between these; where somebody is there to be asked they must not last.
+  const bool several = size >= SeveralStepsFrom && (!control.progress || size <= AskedInTimeUpTo);
+  const std::size_t rowCount = static_cast<std::size_t>(this->rows());
+  std::vector<double> squares(StepsInOnePass * rowCount);
   report.reason = StopReason::MaxIterations;
-  for (int i = 0; i < steps; ++i)
+  while (report.iterations < steps)
   {
-    const double rNorm = std::sqrt(SumRows(this->parallelFor, this->rows(), size,
-      [&](std::int64_t r)
+    const int stages = several ? std::min(StepsInOnePass, steps - report.iterations) : 1;
+    const auto advance = [&](int stage, std::int64_t r)
+    {
+      const double* from = fields[(at + stage) % 2];
+      double* to = fields[(at + stage + 1) % 2];
+      DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
+      static thread_local std::vector<double> store;
+      store.resize(2 * static_cast<std::size_t>(nx) + 2);
+      if (r == 0 || r + 1 == this->rows())
       {
-        DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
-        static thread_local std::vector<double> store;
-        store.resize(2 * static_cast<std::size_t>(nx) + 2);
-        if (r == 0 || r + 1 == this->rows())
-        {
-          // the kernel reads one value more on either side than the caller has
-          double* own = store.data() + nx + 1;
-          std::copy(row.x, row.x + nx, own);
-          own[-1] = own[nx] = 0.;
-          row.x = own;
-        }
-        if (local)
-        {
-          localSteps(row, step, store.data());
-        }
-        return explicitRow(row, q ? q + r * nx : nullptr, b.qScale, b.mean, step,
+        // the kernel reads one value more on either side than the caller has
+        double* own = store.data() + nx + 1;
+        std::copy(row.x, row.x + nx, own);
+        own[-1] = own[nx] = 0.;
+        row.x = own;
+      }
+      if (local)
+      {
+        localSteps(row, step, store.data());
+      }
+      squares[static_cast<std::size_t>(stage) * rowCount + static_cast<std::size_t>(r)] =
+        explicitRow(row, q ? q + r * nx : nullptr, b.qScale, b.mean, step,
           local ? store.data() : nullptr, to + r * nx);
-      }));
-    std::swap(from, to);
-    ++report.iterations;
-    report.fineApplications += 1.;
+    };
+    if (stages == 1)
+    {
+      ForRows(this->parallelFor, this->rows(), size,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          for (std::int64_t r = begin; r < end; ++r)
+          {
+            advance(0, r);
+          }
+        });
+    }
+    else
+    {
+      ForEachStage(this->A, stages, this->parallelFor, advance);
+    }
+    at = (at + stages) % 2;
+    report.iterations += stages;
+    report.fineApplications += stages;
+    // of what the last step began with
+    double sum = 0.;
+    for (std::size_t r = 0; r < rowCount; ++r)
+    {
+      sum += squares[static_cast<std::size_t>(stages - 1) * rowCount + r];
+    }
+    const double rNorm = std::sqrt(sum);
     if (!std::isfinite(rNorm))
     {
       report.reason = StopReason::NotFinite;
@@ -2566,15 +2601,17 @@ DiffusionReport DiffusionSolver::march(
     }
     if (control.intermediate && now() - seen >= control.intermediateInterval)
     {
-      control.intermediate(from);
+      control.intermediate(fields[at]);
       seen = now();
     }
-    if (control.progress && !control.progress(static_cast<double>(i + 1) / steps))
+    if (control.progress &&
+      !control.progress(static_cast<double>(report.iterations) / static_cast<double>(steps)))
     {
       report.reason = StopReason::Cancelled;
       break;
     }
   }
+  const double* from = fields[at];
   if (from != phi)
   {
     std::copy(from, from + size, phi);

@@ -895,6 +895,13 @@ double Advance(const DiffusionOperator& A, const float* z, float beta, float* p,
     { return advanceRow(n, f, viewRow(A, z, row, o), beta, p + o, y + o); });
 }
 
+void ForEachStage(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor,
+  const std::function<void(int stage, std::int64_t row)>& body)
+{
+  skew(A, stages, parallelFor,
+    [&body](int stage, std::int64_t row, const RowFaces&) { body(stage, row); });
+}
+
 void DivideByDiagonal(
   const DiffusionOperator& A, const float* r, float* z, const ParallelFor& parallelFor)
 {

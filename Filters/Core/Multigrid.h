@@ -125,6 +125,14 @@ double SumEachRow(const DiffusionOperator& A, const ParallelFor& parallelFor, co
 /** Gives a voxel with neither face nor sink the sink `s`, so that nothing divides by zero. */
 void CloseIsolated(DiffusionOperator& A, float s, const ParallelFor& parallelFor);
 
+/**
+ * body(stage, row) for each row of the domain and each stage, as if the stages came one after the
+ * other, in one pass over the memory. A stage may read the row itself and its four neighbours as
+ * the stage before left them, and write what the stage before has read: two fields in turn.
+ */
+void ForEachStage(const DiffusionOperator& A, int stages, const ParallelFor& parallelFor,
+  const std::function<void(int stage, std::int64_t row)>& body);
+
 /** z = r / diagonal */
 void DivideByDiagonal(
   const DiffusionOperator& A, const float* r, float* z, const ParallelFor& parallelFor);

@@ -3,6 +3,7 @@
 /** Time steps: exact decay of eigenmodes, bounds, positivity, the steady state reached. */
 #include "DiffusionScene.h"
 #include "LightTransportTesting.h"
+#include "ThreadedFor.h"
 
 #include <random>
 
@@ -363,12 +364,70 @@ void local(Suite& suite)
     solver.stepLocal(closed.q.data(), closed.phi.data(), 1, 1., control).reason ==
       StopReason::NoSteadyState);
 }
+
+/** On many voxels, steps go through the memory four at a time: to the bit what single ones do. */
+void together(Suite& suite)
+{
+  for (const std::array<int, 3>& dims :
+    { std::array<int, 3>{ { 83, 90, 71 } }, std::array<int, 3>{ { 20, 11, 2400 } },
+      std::array<int, 3>{ { 30, 20000, 1 } }, std::array<int, 3>{ { 530000, 1, 1 } } })
+  {
+    DiffusionScene scene = randomScene(13, dims, 0.5);
+    const ParallelFor threads = lighttransport::testing::ThreadedFor(3);
+    DiffusionSolver solver(threads);
+    solver.setMedium(scene.medium());
+    for (const bool local : { false, true })
+    {
+      const double length = local ? 1. : solver.positivityBound();
+      const auto step = [&](int steps, std::vector<double>& phi)
+      {
+        return local
+          ? solver.stepLocal(scene.q.data(), phi.data(), steps, length, DiffusionControl())
+          : solver.stepExplicit(scene.q.data(), phi.data(), steps, length, DiffusionControl());
+      };
+      std::vector<double> at = scene.phi;
+      const DiffusionReport report = step(11, at); // 4, 4 and 3
+      LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.iterations == 11);
+      if (lighttransport::testing::LookingForRaces)
+      {
+        break;
+      }
+      std::vector<double> singly = scene.phi;
+      for (int i = 0; i < 11; ++i)
+      {
+        step(1, singly);
+      }
+      LT_CHECK(suite, at == singly);
+    }
+    if (lighttransport::testing::LookingForRaces)
+    {
+      continue;
+    }
+    // asked after each four, and the fourth is where it stops
+    DiffusionControl control;
+    std::vector<double> shown;
+    control.intermediateInterval = 0.;
+    control.intermediate = [&](const double* phi) { shown.assign(phi, phi + scene.phi.size()); };
+    int calls = 0;
+    control.progress = [&calls](double) { return ++calls < 2; };
+    std::vector<double> phi = scene.phi;
+    const DiffusionReport report =
+      solver.stepExplicit(scene.q.data(), phi.data(), 100, solver.positivityBound(), control);
+    LT_CHECK(suite, report.reason == StopReason::Cancelled && report.iterations == 8);
+    LT_CHECK(suite, shown == phi);
+  }
+}
 } // namespace
 
 int main(int argc, char* argv[])
 {
   Suite suite(argc, argv);
   Suite::trapFloatingPoint();
+  together(suite);
+  if (lighttransport::testing::LookingForRaces)
+  {
+    return suite.result();
+  }
   eigenmode(suite);
   steadyReached(suite);
   bounds(suite);
