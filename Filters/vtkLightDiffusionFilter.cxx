@@ -844,10 +844,21 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   const auto choose = [&](const auto* q) -> DiffusionReport
   {
     DiffusionReport before;
-    // A budget that the full grid's set-up may exceed: a preview, which also tells how fast this
-    // machine is today.
-    const double usual = 150e-9 * static_cast<double>(size);
-    if (this->TimeBudget > 0. && this->TimeBudget < usual && !(kept.valid && key == kept.key))
+    before.reason = lighttransport::StopReason::BadInput;
+    // A budget that the full grid's set-up may exceed. How fast this machine is today, its first
+    // part tells: the rest, and one iteration, takes six times as long.
+    const double perPoint = this->TimeBudget / static_cast<double>(size);
+    bool hasty = this->TimeBudget > 0. && perPoint < 25e-9 && !(kept.valid && key == kept.key);
+    if (!hasty && this->TimeBudget > 0. && perPoint < 150e-9 && !(kept.valid && key == kept.key))
+    {
+      if (!setUpFull())
+      {
+        before.message = problem;
+        return before;
+      }
+      hasty = timeLeft() < 6. * setupSeconds;
+    }
+    if (hasty)
     {
       lighttransport::CoarseDiffusion preview(vtkLightTransportParallelFor());
       before = withMedium([&](const auto& medium) { return preview.setMedium(medium, 4, true); });
@@ -855,38 +866,18 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       {
         return before;
       }
-      setupSeconds = before.seconds;
-      control.timeBudget = 1e-9;
-      before = preview.solve(q, phi.data(), control, false);
-      const double floor = 3. * (before.seconds + setupSeconds);
-      if (before.reason != lighttransport::StopReason::MaxIterations || timeLeft() < floor)
-      {
-        this->UsedCoarseningFactor = 4;
-        control.timeBudget = timeLeft();
-        if (before.reason != lighttransport::StopReason::MaxIterations || timeLeft() < 1e-6)
-        {
-          return before;
-        }
-        DiffusionReport better = preview.solve(q, phi.data(), control, true);
-        better.seconds += before.seconds;
-        better.iterations += before.iterations;
-        better.fineApplications += before.fineApplications;
-        return better;
-      }
+      setupSeconds += before.seconds;
+      this->UsedCoarseningFactor = 4;
+      control.timeBudget = timeLeft();
+      return preview.solve(q, phi.data(), control, false);
     }
     if (!setUpFull())
     {
-      before.reason = lighttransport::StopReason::BadInput;
       before.message = problem;
       return before;
     }
     control.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
-    DiffusionReport full = kept.solver.solveSteady(q, phi.data(), control);
-    full.iterations += before.iterations;
-    full.fineApplications += before.fineApplications;
-    full.seconds += before.seconds;
-    full.bytes = std::max(full.bytes, before.bytes);
-    return full;
+    return kept.solver.solveSteady(q, phi.data(), control);
   };
   lighttransport::FirstMomentReport energies;
   const auto solve = [&](const auto* q) -> DiffusionReport

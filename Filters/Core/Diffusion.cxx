@@ -1403,7 +1403,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     return;
   }
   report.residual = rNorm / bNorm;
-  if (rNorm <= goal)
+  const bool named = control.targetError > 0. || control.timeBudget > 0.;
+  if (rNorm <= goal && !named) // else the first cycle tells the error
   {
     report.reason = StopReason::Converged;
     return;
@@ -1467,7 +1468,6 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   bool fresh = true;
   std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()), 0.);
   double seen = began;
-  const bool named = control.targetError > 0. || control.timeBudget > 0.;
   SlowError slow;
   double lastEstimate = began;
   double rEstimated = 0.; // the residual's norm when the error was estimated
@@ -1563,6 +1563,11 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     {
       this->estimateError(phi, z.data(), rScale * slow.factor(rzOfPhi), report);
       rEstimated = rNorm;
+      if (rNorm <= goal) // where it started
+      {
+        report.reason = StopReason::Converged;
+        return;
+      }
       if (iteration > 0 && control.targetError > 0. &&
         report.estimatedError <= 0.5 * control.targetError)
       {
