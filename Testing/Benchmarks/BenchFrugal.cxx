@@ -4,7 +4,8 @@
  * What a solve that is no better than the scene requires costs, and how wrong it is, through the
  * filter as a user runs it:
  *
- *   bench-frugal [--output FOLDER] [--sections grid,region,warm,target,knobs] [--size 64]
+ *   bench-frugal [--output FOLDER] [--sections grid,region,warm,cancel,target,budget,knobs] [--size
+ * 64]
  *     [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD] [--seed 0]
  *
  *   target  SetTargetError over all scenes: is the target met, is the estimate near the truth?
@@ -12,6 +13,7 @@
  *   grid    SetCoarseningFactor over all scenes: the error of a coarser grid
  *   region  an active region against the full solve: a tube, the aorta of thorax_ct, open matter
  *   warm    one seed of eight moved in a converged 128^3 field: 20 moves
+ *   cancel  how soon a solve returns that is told to stop, 128^3 and 256^3
  *   knobs   time against error for every knob, on two media
  *
  * "All scenes" are those that the estimate was tuned on, or, with --seed above 0, 40 others drawn
@@ -28,6 +30,7 @@
 #include "vtkLightSeedFilter.h"
 #include "vtkLightTransportArrays.h"
 
+#include "vtkCallbackCommand.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkNew.h"
@@ -36,6 +39,7 @@
 #include "vtkSMPTools.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -49,6 +53,7 @@
 #include <random>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 using namespace frugal;
@@ -58,7 +63,8 @@ namespace
 struct Options
 {
   std::string output; // build/dev/frugal, beside the folder of the program
-  std::vector<std::string> sections{ "grid", "region", "warm", "target", "budget", "knobs" };
+  std::vector<std::string> sections{ "grid", "region", "warm", "cancel", "target", "budget",
+    "knobs" };
   std::string data = "../shared/data";
   std::string only;
   int size = 64;
@@ -576,6 +582,68 @@ void MeasureWarmStarts(const Options& options)
 }
 
 //------------------------------------------------------------------------------
+/** How long after a wish to stop, at any moment of a solve, is it over? */
+void MeasureCancelling(const Options& options)
+{
+  Table csv(options, "frugal-cancel", "voxels,asked,took");
+  std::printf(
+    "\n## Cancelling a solve from darkness, 40 moments evenly over it\n\n"
+    "| size | a whole solve, s | ms until it returns, median | most | with a field that may "
+    "be shown |\n|---|---|---|---|---|\n");
+  for (const int n : { 128, 256 })
+  {
+    const vtkSmartPointer<vtkImageData> image =
+      WithSeeds(Tissue(n, .99, 1e-4), { { .35 * n, .4 * n, .5 * n, 2., 1. } });
+    const double whole = Solve(
+      image, [](vtkLightDiffusionFilter*) {}, 1, nullptr)
+                           .seconds;
+    std::vector<double> took;
+    int shown = 0;
+    int cancelled = 0;
+    for (int i = 0; i < 40; ++i)
+    {
+      vtkNew<vtkLightDiffusionFilter> filter;
+      filter->SetInputData(image);
+      std::atomic<bool> wish{ false };
+      vtkNew<vtkCallbackCommand> obey;
+      obey->SetClientData(&wish);
+      obey->SetCallback(
+        [](vtkObject* caller, unsigned long, void* asked, void*)
+        {
+          if (*static_cast<std::atomic<bool>*>(asked))
+          {
+            static_cast<vtkAlgorithm*>(caller)->SetAbortExecute(1);
+          }
+        });
+      filter->AddObserver(vtkCommand::ProgressEvent, obey);
+      double asked = 0.;
+      const double wait = whole * (i + .5) / 40.;
+      std::thread user(
+        [&]
+        {
+          std::this_thread::sleep_for(std::chrono::duration<double>(wait));
+          asked = now();
+          wish = true;
+        });
+      filter->Update();
+      const double ended = now();
+      user.join();
+      if (filter->GetStopReason() == vtkLightDiffusionFilter::Cancelled)
+      {
+        ++cancelled;
+        took.push_back(1e3 * (ended - asked));
+        csv.add(n * n * n, wait, 1e-3 * took.back());
+        const std::vector<double> field = Values(filter);
+        shown += std::all_of(field.begin(), field.end(), [](double v) { return std::isfinite(v); });
+      }
+    }
+    std::printf("| %d³ | %.3f | %.0f | %.0f | %d of %d |\n", n, whole, median(took),
+      took.empty() ? 0. : *std::max_element(took.begin(), took.end()), shown, cancelled);
+    std::fflush(stdout);
+  }
+}
+
+//------------------------------------------------------------------------------
 void MeasureKnobs(const Options& options)
 {
   Table csv(
@@ -711,7 +779,8 @@ int main(int argc, char* argv[])
   if (!Parse(argc, argv, options))
   {
     std::fprintf(stderr,
-      "usage: bench-frugal [--output FOLDER] [--sections grid,region,warm,target,budget,knobs]\n"
+      "usage: bench-frugal [--output FOLDER] [--sections "
+      "grid,region,warm,cancel,target,budget,knobs]\n"
       "  [--size 64] [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD]\n"
       "  [--seed 0]\n");
     return 2;
@@ -726,10 +795,10 @@ int main(int argc, char* argv[])
   vtkObject::SetGlobalWarningDisplay(
     std::getenv("WARN") ? 1 : 0); // a budget that is used up is no surprise here
   std::printf("# bench-frugal\n\n%d threads, medians of %d.\n", options.threads, options.repeat);
-  const std::pair<const char*, void (*)(const Options&)> sections[] = {
-    { "warm", MeasureWarmStarts }, { "region", MeasureRegions }, { "grid", MeasureGrids },
-    { "knobs", MeasureKnobs }, { "target", MeasureTargets }, { "budget", MeasureBudgets }
-  };
+  const std::pair<const char*, void (*)(const Options&)> sections[] = { { "warm",
+                                                                          MeasureWarmStarts },
+    { "cancel", MeasureCancelling }, { "region", MeasureRegions }, { "grid", MeasureGrids },
+    { "knobs", MeasureKnobs }, { "target", MeasureTargets }, { "budget", MeasureBudgets } };
   for (const auto& section : sections)
   {
     if (options.has(section.first))
