@@ -323,8 +323,8 @@ public:
    * counts from the start of the execution, output included. Where it is too short to set up the
    * full grid (128^3: some 0.1 s), cells of four points serve as a preview (GetUsedCoarseningFactor
    * is 4), with corrections as far as time goes; without time for one, the estimate is 1, a guess,
-   * and GetMessage says so. The preview itself, 17 ns per point on the two cores of measured.md, is the least
-   * that is done.
+   * and GetMessage says so. The preview itself, 17 ns per point on the two cores of measured.md, is
+   * the least that is done.
    */
   vtkSetMacro(TimeBudget, double);
   vtkGetMacro(TimeBudget, double);
@@ -395,7 +395,10 @@ public:
   vtkGetMacro(ActiveFraction, double);
   ///@}
   ///@{
-  /** Power: the integrals of q, of sigma_a phi, and of the flux through the border. */
+  /**
+   * Power: the integrals of q, of sigma_a phi, and of the flux through the border. 0 after
+   * Cancelled, which ends at once.
+   */
   vtkGetMacro(EmittedPower, double);
   vtkGetMacro(AbsorbedPower, double);
   vtkGetMacro(EscapedPower, double);

@@ -1026,12 +1026,12 @@ void DiffusionSolver::setShift(double value)
   this->multigridReady = false;
 }
 
-void DiffusionSolver::prepareMultigrid()
+void DiffusionSolver::prepareMultigrid(const ParallelFor& loop)
 {
   if (!this->multigridReady)
   {
     this->storeFaces();
-    this->multigrid.setup(this->A, this->parallelFor);
+    this->multigrid.setup(this->A, loop);
     this->multigridReady = true;
   }
 }
@@ -1443,7 +1443,29 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   };
   const ParallelFor& loop = control.progress ? watched : this->parallelFor;
 
-  this->prepareMultigrid();
+  // A set-up that is given up half-way is none: what it has made goes.
+  struct GivenUp
+  {
+  };
+  try
+  {
+    this->prepareMultigrid(
+      [&](std::int64_t n, const RangeBody& body)
+      {
+        loop(n, body);
+        if (cancelled)
+        {
+          throw GivenUp();
+        }
+      });
+  }
+  catch (const GivenUp&)
+  {
+    this->multigrid = Multigrid();
+    report.reason = StopReason::Cancelled;
+    report.message = "cancelled while setting up; the field is the one before";
+    return;
+  }
   const DiffusionOperator& op = this->A;
   // A rough answer is had with less memory: faces are computed, and z and A p share theirs.
   const bool frugal = control.tolerance >= FrugalTolerance;
@@ -1679,7 +1701,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     if (!goOn())
     {
-      finish(StopReason::Cancelled);
+      cancel();
       return;
     }
   }
@@ -2025,7 +2047,10 @@ DiffusionReport DiffusionSolver::solveSteady(
         phi[i] -= mean;
       }
     }
-    this->balance(q, phi, report);
+    if (report.reason != StopReason::Cancelled) // at once
+    {
+      this->balance(q, phi, report);
+    }
   }
   report.seconds = now() - began;
   return report;
