@@ -846,8 +846,6 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     DiffusionReport before;
     before.reason = lighttransport::StopReason::BadInput;
     // Light that stays where it is: its region alone. To find out costs some per cent of a solve.
-    const double perPoint = this->TimeBudget / static_cast<double>(size);
-    if (!(this->TimeBudget > 0.) || perPoint > 10e-9)
     {
       lighttransport::DiffusionSolver regional(vtkLightTransportParallelFor());
       lighttransport::DiffusionControl own = control;
@@ -855,13 +853,22 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       own.regionOrNothing = true;
       before = withMedium([&](const auto& medium)
         { return regional.solveActive(medium, q, phi.data(), own, this->ActiveThreshold); });
-      if (before.activeFraction < 1. || before.reason != lighttransport::StopReason::MaxIterations)
+      using lighttransport::StopReason;
+      const bool whole = before.activeFraction == 1. && before.reason == StopReason::MaxIterations;
+      const bool failed = before.reason == StopReason::NotFinite ||
+        before.reason == StopReason::Breakdown || before.reason == StopReason::Diverged;
+      if (!whole && !failed)
       {
         return before;
+      }
+      if (failed)
+      {
+        std::fill(phi.data(), phi.data() + size, 0.);
       }
       setupSeconds += before.seconds;
       before.reason = lighttransport::StopReason::BadInput;
     }
+    const double perPoint = this->TimeBudget / static_cast<double>(size);
     // A budget that the full grid's set-up may exceed. How fast this machine is today, its first
     // part tells: the rest, and one iteration, takes six times as long.
     bool hasty = this->TimeBudget > 0. && perPoint < 25e-9 && !(kept.valid && key == kept.key);
@@ -996,9 +1003,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
     (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
       this->TargetError < 1e-6);
-  // what rounding the output adds: 2^-24 at the most
-  const auto rounded = [toDouble](double estimate, double rounding)
-  { return estimate < 0. || toDouble ? estimate : std::hypot(estimate, rounding); };
+  // and what rounding the output adds, 2^-24 at the most, and the light that a region cuts off
+  const double cut =
+    report.leaked != 0. && report.emitted != 0. ? std::abs(report.leaked / report.emitted) : 0.;
+  const auto rounded = [toDouble, cut](double estimate, double rounding)
+  {
+    return estimate < 0. ? estimate
+                         : std::hypot(std::hypot(estimate, cut), toDouble ? 0. : rounding);
+  };
   this->EstimatedError = rounded(report.estimatedError, 5.5e-8);
   this->EstimatedErrorL2 = rounded(report.estimatedErrorL2, 3e-8);
   this->ActiveFraction = report.activeFraction;

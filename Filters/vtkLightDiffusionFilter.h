@@ -304,11 +304,11 @@ public:
   /**
    * The error that is accepted, in [0, 1): the 95th percentile of |phi - phi*| / |phi*| over the
    * voxels within six decades of the largest |phi*|, with phi* the exact solution of the discrete
-   * equations on the full grid. Where above 0, a steady solve chooses what does: from the last
-   * state, with Continue, cells of two points and corrections by the full grid's equations, and
-   * where these do not get there, the full grid from where they are; otherwise as many iterations
-   * on the full grid as it takes (with ActiveRegionOn, on the region alone). GetEstimatedError
-   * tells what was reached, GetUsedCoarseningFactor, GetActiveFraction and
+   * equations on the full grid. Where above 0, a steady solve chooses what does, in this order:
+   * from the last state, with Continue, cells of two points and corrections by the full grid's
+   * equations; where light stays in less than a quarter of the volume, that region alone (to find
+   * out costs some per cent); the full grid, with as many iterations as it takes.
+   * GetEstimatedError tells what was reached, GetActiveFraction, GetUsedCoarseningFactor and
    * GetNumberOfIterationsUsed what was chosen; Tolerance only ends it earlier. Default 0: Tolerance
    * decides.
    */
@@ -320,11 +320,10 @@ public:
   /**
    * Seconds after which a steady solve gives its best answer, chosen as with TargetError, with an
    * estimate of its error; the stop reason is then MaxIterations. >= 0; default 0: no limit. It
-   * counts from the start of the execution, output included. Where it is too short to set up the
-   * full grid (128^3: some 0.1 s), cells of four points serve as a preview (GetUsedCoarseningFactor
-   * is 4), with corrections as far as time goes; without time for one, the estimate is 1, a guess,
-   * and GetMessage says so. The preview itself, 17 ns per point on the two cores of measured.md, is
-   * the least that is done.
+   * counts from the start of the execution, output included. Where it is too short for the full
+   * grid's set-up (128^3: some 0.1 s), cells of four points without corrections serve as a preview:
+   * GetUsedCoarseningFactor is 4, the estimate is 1, a guess, and GetMessage says so. The preview
+   * is the least that is done, some 20 ns per point on the two cores of measured.md.
    */
   vtkSetMacro(TimeBudget, double);
   vtkGetMacro(TimeBudget, double);

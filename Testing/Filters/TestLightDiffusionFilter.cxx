@@ -505,6 +505,7 @@ void frugal(Suite& suite)
   active->Update();
   LT_CHECK(suite, active->GetStopReason() == Filter::Converged);
   LT_CHECK(suite, active->GetEstimatedError() > 0. && active->GetEstimatedError() <= 0.01);
+  LT_CHECK(suite, active->GetActiveFraction() < 0.25); // the region, unasked
   LT_CHECK_CLOSE(suite, fluenceAt(active, 30, 20, 20), fluenceAt(full, 30, 20, 20), 0.02);
   LT_CHECK(suite, active->GetNumberOfIterationsUsed() > 0);
   vtkNew<MessageLog> warnings;
@@ -513,6 +514,7 @@ void frugal(Suite& suite)
   active->SetTimeBudget(1e-9);
   active->Update();
   LT_CHECK(suite, active->GetStopReason() == Filter::MaxIterations);
+  LT_CHECK(suite, active->GetActiveFraction() < 0.25 && active->GetUsedCoarseningFactor() == 1);
   LT_CHECK(suite, active->GetEstimatedError() > 0. && warnings->messages.empty());
 
   class Show : public vtkCommand
@@ -573,6 +575,18 @@ void coarser(Suite& suite)
   const std::vector<std::string> errors = errorsOfUpdate(coarse);
   LT_CHECK(
     suite, errors.size() == 1 && errors[0].find("CoarseningFactor is 3") != std::string::npos);
+
+  // a budget below any set-up: a preview that says so, on this side of the wall alone
+  vtkNew<Filter> hasty;
+  hasty->SetInputData(image);
+  hasty->SetTimeBudget(1e-9);
+  hasty->Update();
+  LT_CHECK(suite, hasty->GetOutput()->GetPointData()->GetArray("Flux") == nullptr);
+  LT_CHECK(suite, hasty->GetStopReason() == Filter::MaxIterations);
+  LT_CHECK(suite, hasty->GetUsedCoarseningFactor() == 4 && hasty->GetEstimatedError() == 1.);
+  LT_CHECK(suite, std::string(hasty->GetMessage()).find("guess") != std::string::npos);
+  LT_CHECK_CLOSE(suite, fluenceAt(coarse, 16, 15, 18), fluenceAt(full, 16, 15, 18), 0.5);
+  LT_CHECK(suite, fluenceAt(coarse, 30, 15, 16) < 1e-12);
 
   // a named error, and a light that moves
   coarse->SetCoarseningFactor(1);
