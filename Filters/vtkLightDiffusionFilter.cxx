@@ -1003,14 +1003,9 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
     (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
       this->TargetError < 1e-6);
-  // and what rounding the output adds, 2^-24 at the most, and the light that a region cuts off
-  const double cut =
-    report.leaked != 0. && report.emitted != 0. ? std::abs(report.leaked / report.emitted) : 0.;
-  const auto rounded = [toDouble, cut](double estimate, double rounding)
-  {
-    return estimate < 0. ? estimate
-                         : std::hypot(std::hypot(estimate, cut), toDouble ? 0. : rounding);
-  };
+  // what rounding the output adds: 2^-24 at the most
+  const auto rounded = [toDouble](double estimate, double rounding)
+  { return estimate < 0. || toDouble ? estimate : std::hypot(estimate, rounding); };
   this->EstimatedError = rounded(report.estimatedError, 5.5e-8);
   this->EstimatedErrorL2 = rounded(report.estimatedErrorL2, 3e-8);
   this->ActiveFraction = report.activeFraction;

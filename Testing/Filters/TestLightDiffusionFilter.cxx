@@ -585,8 +585,8 @@ void coarser(Suite& suite)
   LT_CHECK(suite, hasty->GetStopReason() == Filter::MaxIterations);
   LT_CHECK(suite, hasty->GetUsedCoarseningFactor() == 4 && hasty->GetEstimatedError() == 1.);
   LT_CHECK(suite, std::string(hasty->GetMessage()).find("guess") != std::string::npos);
-  LT_CHECK_CLOSE(suite, fluenceAt(coarse, 16, 15, 18), fluenceAt(full, 16, 15, 18), 0.5);
-  LT_CHECK(suite, fluenceAt(coarse, 30, 15, 16) < 1e-12);
+  LT_CHECK_CLOSE(suite, fluenceAt(hasty, 16, 15, 18), fluenceAt(full, 16, 15, 18), 0.5);
+  LT_CHECK(suite, fluenceAt(hasty, 30, 15, 16) < 1e-12);
 
   // a named error, and a light that moves
   coarse->SetCoarseningFactor(1);
