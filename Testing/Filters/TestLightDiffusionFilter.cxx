@@ -583,7 +583,8 @@ void coarser(Suite& suite)
   hasty->Update();
   LT_CHECK(suite, hasty->GetOutput()->GetPointData()->GetArray("Flux") == nullptr);
   LT_CHECK(suite, hasty->GetStopReason() == Filter::MaxIterations);
-  LT_CHECK(suite, hasty->GetUsedCoarseningFactor() == 4 && hasty->GetEstimatedError() == 1.);
+  LT_CHECK(suite, hasty->GetUsedCoarseningFactor() == 4);
+  LT_CHECK_NEAR(suite, hasty->GetEstimatedError(), 1., 1e-9);
   LT_CHECK(suite, std::string(hasty->GetMessage()).find("guess") != std::string::npos);
   LT_CHECK_CLOSE(suite, fluenceAt(hasty, 16, 15, 18), fluenceAt(full, 16, 15, 18), 0.5);
   LT_CHECK(suite, fluenceAt(hasty, 30, 15, 16) < 1e-12);
