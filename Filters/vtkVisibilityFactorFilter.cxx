@@ -132,21 +132,6 @@ private:
   std::vector<double> values;
 };
 
-/** Shares of the channels in the extinction, with the mean 1. */
-void TransportColour(const double rgb[3], double shares[3])
-{
-  double sum = 0.;
-  for (int c = 0; c < 3; ++c)
-  {
-    shares[c] = 1. - std::min(std::max(rgb[c], 0.), 1.) + ColourFloor;
-    sum += shares[c];
-  }
-  for (int c = 0; c < 3; ++c)
-  {
-    shares[c] *= 3. / sum;
-  }
-}
-
 /** Nodes outside [0, 1], or no nodes: a message, else nothing. */
 std::string FunctionProblem(vtkPiecewiseFunction* function, const char* name)
 {
@@ -298,26 +283,31 @@ struct vtkVisibilityFactorFilter::State
   std::string harmonicsKey;
   vtkSmartPointer<vtkFloatArray> harmonics;
   // Stage 4.
-  std::string visibilityKey;
-  std::vector<Light> seen;
-  vtkSmartPointer<vtkFloatArray> visibility;
+  struct Field
+  {
+    Light light;
+    vtkSmartPointer<vtkFloatArray> values;
+  };
+  std::string fieldsKey;
+  std::vector<Field> fields;
+  vtkSmartPointer<vtkFloatArray> visibility; // of all lights, where it is asked for
 
   void forget()
   {
     this->extinctionKey.clear();
     this->sigma_t.clear();
     this->forgetHarmonics();
-    this->forgetVisibility();
+    this->forgetFields();
   }
   void forgetHarmonics()
   {
     this->harmonicsKey.clear();
     this->harmonics = nullptr;
   }
-  void forgetVisibility()
+  void forgetFields()
   {
-    this->visibilityKey.clear();
-    this->seen.clear();
+    this->fieldsKey.clear();
+    this->fields.clear();
     this->visibility = nullptr;
   }
 };
@@ -415,6 +405,21 @@ int vtkVisibilityFactorFilter::GetNumberOfLights() const
 }
 
 //------------------------------------------------------------------------------
+void vtkVisibilityFactorFilter::GetTransportColor(const double rgb[3], double shares[3])
+{
+  double sum = 0.;
+  for (int c = 0; c < 3; ++c)
+  {
+    shares[c] = 1. - std::min(std::max(rgb[c], 0.), 1.) + ColourFloor;
+    sum += shares[c];
+  }
+  for (int c = 0; c < 3; ++c)
+  {
+    shares[c] *= 3. / sum;
+  }
+}
+
+//------------------------------------------------------------------------------
 void vtkVisibilityFactorFilter::GetWindow(int order, double factors[5])
 {
   std::fill(factors, factors + 5, 0.);
@@ -427,7 +432,6 @@ void vtkVisibilityFactorFilter::GetWindow(int order, double factors[5])
 void vtkVisibilityFactorFilter::GetHarmonics(
   int order, const double direction[3], double values[25])
 {
-  std::fill(values, values + 25, 0.);
   lighttransport::SphericalHarmonics(std::min(std::max(order, 0), HighestVisibilityOrder),
     { { direction[0], direction[1], direction[2] } }, values);
 }
@@ -599,7 +603,8 @@ int vtkVisibilityFactorFilter::RequestData(
     text << "not enough memory for Order " << this->Order << " with a ResolutionFactor of "
          << this->ResolutionFactor << ", expected about "
          << std::ceil(4e-6 * voxels * (this->RGBExtinction ? 3. : 1.) *
-              (NumberOfHarmonics(this->Order) + 3. + this->GetNumberOfLights()))
+              (NumberOfHarmonics(this->Order) + 3. +
+                (this->SeparateLights ? 1. : 2.) * this->GetNumberOfLights()))
          << " MB free. Take a lower order or a larger factor";
     problem = text.str();
     this->Kept->forget();
@@ -674,85 +679,104 @@ std::string vtkVisibilityFactorFilter::Compute(
     this->HarmonicsSeconds = Now() - began;
   }
 
-  // Stage 4: the lights that changed.
+  // Stage 4: the lights that changed, each in an array of its own.
   const auto lights = static_cast<int>(kept.lights.size());
-  std::ostringstream visibilityKey;
-  visibilityKey.precision(17);
-  visibilityKey << lights << " " << this->Radius << " " << kept.extinctionKey;
-  if (lights == 0)
+  std::ostringstream fieldsKey;
+  fieldsKey.precision(17);
+  fieldsKey << this->Radius << " " << kept.extinctionKey;
+  if (kept.fieldsKey != fieldsKey.str())
   {
-    kept.forgetVisibility();
+    kept.forgetFields();
+    kept.fieldsKey = fieldsKey.str();
   }
-  else if (kept.visibilityKey != visibilityKey.str() || !(kept.seen == kept.lights))
+  kept.fields.resize(static_cast<std::size_t>(lights));
+  const double beganLights = Now();
+  bool swept = false;
+  for (int l = 0; l < lights; ++l)
   {
-    const double began = Now();
-    const std::vector<Light> seen =
-      kept.visibilityKey == visibilityKey.str() ? kept.seen : std::vector<Light>();
-    // Never the array that an output holds already: it is an output's to keep.
-    auto visibility = vtkSmartPointer<vtkFloatArray>::New();
-    if (seen.empty())
+    const Light& light = kept.lights[l];
+    if (kept.fields[l].values && kept.fields[l].light == light)
     {
-      kept.forgetVisibility();
-      visibility->SetNumberOfComponents(channels * lights);
-      visibility->SetNumberOfTuples(size);
+      continue;
+    }
+    // Along the grid's axes, from the first voxel's centre.
+    std::array<double, 3> at{};
+    if (light.positional)
+    {
+      double index[3];
+      image::WorldToIndex(input, light.at.data(), index);
+      for (int a = 0; a < 3; ++a)
+      {
+        const double h = input->GetSpacing()[a];
+        at[a] = index[a] * h - 0.5 * (kept.grid.spacing[a] - h);
+      }
     }
     else
     {
-      visibility->DeepCopy(kept.visibility);
+      double largest = 0.;
+      for (double x : light.at)
+      {
+        largest = std::max(largest, std::abs(x));
+      }
+      for (int a = 0; a < 3; ++a)
+      {
+        for (int w = 0; w < 3; ++w)
+        {
+          at[a] += kept.axes[a][w] * (light.at[w] / largest);
+        }
+      }
     }
-    visibility->SetName(vtkLightTransportArrays::Visibility);
-    for (int l = 0; l < lights; ++l)
+    // Never the array that an output holds already: it is an output's to keep.
+    auto field = vtkSmartPointer<vtkFloatArray>::New();
+    field->SetName((vtkLightTransportArrays::Visibility + std::to_string(l)).c_str());
+    field->SetNumberOfComponents(channels);
+    field->SetNumberOfTuples(size);
+    for (int c = 0; c < channels; ++c)
     {
-      const Light& light = kept.lights[l];
-      if (static_cast<std::size_t>(l) < seen.size() && seen[l] == light)
+      float* v = field->GetPointer(0) + c;
+      const VisibilityMedium medium{ kept.grid, kept.sigma_t[c].data(), this->Radius };
+      const ProgressFunction progress =
+        image::Progress(this, 0.8 + 0.2 * l / lights, 0.8 + 0.2 * (l + 1) / lights);
+      if (!(light.positional ? VisibilityTowardsPoint(medium, at, v, channels, parallel, progress)
+                             : VisibilityTowards(medium, at, v, channels, parallel, progress)))
       {
-        continue;
+        return {};
       }
-      // Along the grid's axes, from the first voxel's centre.
-      std::array<double, 3> at{};
-      if (light.positional)
+    }
+    kept.fields[l] = { light, field };
+    kept.visibility = nullptr;
+    swept = true;
+  }
+  if (lights == 0 || this->SeparateLights)
+  {
+    kept.visibility = nullptr;
+  }
+  else if (!(kept.visibility && kept.visibility->GetNumberOfComponents() == channels * lights))
+  {
+    kept.visibility = vtkSmartPointer<vtkFloatArray>::New();
+    kept.visibility->SetName(vtkLightTransportArrays::Visibility);
+    kept.visibility->SetNumberOfComponents(channels * lights);
+    kept.visibility->SetNumberOfTuples(size);
+    float* to = kept.visibility->GetPointer(0);
+    ForRows(parallel, size, size * channels * lights,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        double index[3];
-        image::WorldToIndex(input, light.at.data(), index);
-        for (int a = 0; a < 3; ++a)
+        for (int l = 0; l < lights; ++l)
         {
-          const double h = input->GetSpacing()[a];
-          at[a] = index[a] * h - 0.5 * (kept.grid.spacing[a] - h);
-        }
-      }
-      else
-      {
-        double largest = 0.;
-        for (double x : light.at)
-        {
-          largest = std::max(largest, std::abs(x));
-        }
-        for (int a = 0; a < 3; ++a)
-        {
-          for (int w = 0; w < 3; ++w)
+          const float* from = kept.fields[l].values->GetPointer(0);
+          for (std::int64_t i = begin; i < end; ++i)
           {
-            at[a] += kept.axes[a][w] * (light.at[w] / largest);
+            for (int c = 0; c < channels; ++c)
+            {
+              to[(i * lights + l) * channels + c] = from[i * channels + c];
+            }
           }
         }
-      }
-      for (int c = 0; c < channels; ++c)
-      {
-        float* v = visibility->GetPointer(0) + std::ptrdiff_t(l) * channels + c;
-        const std::int64_t stride = std::int64_t(lights) * channels;
-        const VisibilityMedium medium{ kept.grid, kept.sigma_t[c].data(), this->Radius };
-        const ProgressFunction progress =
-          image::Progress(this, 0.8 + 0.2 * l / lights, 0.8 + 0.2 * (l + 1) / lights);
-        if (!(light.positional ? VisibilityTowardsPoint(medium, at, v, stride, parallel, progress)
-                               : VisibilityTowards(medium, at, v, stride, parallel, progress)))
-        {
-          return {};
-        }
-      }
-    }
-    kept.visibility = visibility;
-    kept.visibilityKey = visibilityKey.str();
-    kept.seen = kept.lights;
-    this->LightsSeconds = Now() - began;
+      });
+  }
+  if (swept)
+  {
+    this->LightsSeconds = Now() - beganLights;
   }
 
   // The output.
@@ -798,9 +822,13 @@ std::string vtkVisibilityFactorFilter::Compute(
       });
     output->GetPointData()->AddArray(mean);
   }
-  if (lights > 0)
+  if (lights > 0 && !this->SeparateLights)
   {
     output->GetPointData()->AddArray(kept.visibility);
+  }
+  for (int l = 0; l < lights && this->SeparateLights; ++l)
+  {
+    output->GetPointData()->AddArray(kept.fields[l].values);
   }
   if (this->OutputExtinction)
   {
@@ -977,7 +1005,7 @@ std::string vtkVisibilityFactorFilter::ComputeExtinction(
           double rgb[3];
           double share[3];
           this->Color->GetColor(s, rgb);
-          TransportColour(rgb, share);
+          vtkVisibilityFactorFilter::GetTransportColor(rgb, share);
           return share[c];
         });
     }
@@ -1008,7 +1036,7 @@ std::string vtkVisibilityFactorFilter::ComputeExtinction(
               both->at(width > 0. ? (values[i] - range.min) / width : 0.,
                 width > 0. ? std::min(lengths[i] / (0.25 * width), 1.) : 0., rgba);
               s = extinctionOf(rgba[3]);
-              TransportColour(rgba, share);
+              vtkVisibilityFactorFilter::GetTransportColor(rgba, share);
             }
             else
             {
@@ -1074,6 +1102,7 @@ void vtkVisibilityFactorFilter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "SphericalHarmonics: " << this->SphericalHarmonics << "\n";
   os << indent << "AmbientOcclusion: " << this->AmbientOcclusion << "\n";
   os << indent << "OutputExtinction: " << this->OutputExtinction << "\n";
+  os << indent << "SeparateLights: " << this->SeparateLights << "\n";
   os << indent << "Lights:";
   for (const Light& light : this->Kept->lights)
   {

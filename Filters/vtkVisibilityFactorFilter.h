@@ -224,6 +224,17 @@ public:
 
   ///@{
   /**
+   * Whether the known lights have an array each, Visibility0, Visibility1, ..., in the
+   * place of Visibility; default off. On: those of lights that stay are the same
+   * objects after an update, and nothing is copied for the one that moves.
+   */
+  vtkSetMacro(SeparateLights, bool);
+  vtkGetMacro(SeparateLights, bool);
+  vtkBooleanMacro(SeparateLights, bool);
+  ///@}
+
+  ///@{
+  /**
    * Known lights, each with a component of Visibility of its own (three with
    * RGBExtinction), in the order of their making; the methods that add one return its
    * number. A directional light has the world direction towards it (of any length
@@ -238,6 +249,12 @@ public:
   ///@}
 
   /**
+   * The shares of red, green and blue in the extinction of what has this colour (0 to
+   * 1), with the mean 1: see RGBExtinction.
+   */
+  static void GetTransportColor(const double rgb[3], double shares[3]);
+
+  /**
    * The window with which VisibilitySH is read, a factor per band 0 to order (at most
    * 4; beyond 0): v(w) = sum_l k_l sum_m v_lm Y_lm(w) then lies in [0, 1]. It is the
    * non-negative kernel of that degree with the largest mean cosine (G. Szego:
@@ -246,8 +263,8 @@ public:
   static void GetWindow(int order, double factors[5]);
 
   /**
-   * Y_lm of a direction of length 1, the first (order + 1)^2 of the values (order at
-   * most 4; beyond 0).
+   * Y_lm of a direction of length 1: sets the first (order + 1)^2 of the values (order
+   * at most 4) and leaves the others alone.
    */
   static void GetHarmonics(int order, const double direction[3], double values[25]);
 
@@ -289,6 +306,7 @@ protected:
   bool SphericalHarmonics = true;
   bool AmbientOcclusion = false;
   bool OutputExtinction = false;
+  bool SeparateLights = false;
   double ExtinctionSeconds = 0.;
   double HarmonicsSeconds = 0.;
   double LightsSeconds = 0.;

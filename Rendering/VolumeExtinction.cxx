@@ -2,7 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "VolumeExtinction.h"
 
+#include "vtkVisibilityFactorFilter.h"
+
 #include "vtkCollection.h"
+#include "vtkColorTransferFunction.h"
+#include "vtkContourValues.h"
 #include "vtkDataArray.h"
 #include "vtkFloatArray.h"
 #include "vtkGPUVolumeRayCastMapper.h"
@@ -90,6 +94,43 @@ bool findScalars(vtkGPUVolumeRayCastMapper* mapper, Scalars& scalars)
 }
 
 //------------------------------------------------------------------------------
+/** A colour of a value in [lo, hi], sampled; constant beyond. */
+struct ColorTable
+{
+  double lo = 0.;
+  double scale = 0.;
+  std::vector<double> entries;
+
+  ColorTable() = default;
+  ColorTable(vtkVolumeProperty* property, int function, double lowest, double highest)
+    : lo(lowest)
+    , scale(highest > lowest ? (TableSize - 1) / (highest - lowest) : 0.)
+    , entries(static_cast<std::size_t>(3) * TableSize)
+  {
+    const double high = std::max(highest, lowest);
+    if (property->GetColorChannels(function) == 3)
+    {
+      property->GetRGBTransferFunction(function)->GetTable(
+        lowest, high, TableSize, this->entries.data());
+    }
+    else
+    {
+      property->GetGrayTransferFunction(function)->GetTable(
+        lowest, high, TableSize, this->entries.data(), 3);
+      for (std::size_t i = 0; i < this->entries.size(); ++i)
+      {
+        this->entries[i] = this->entries[i / 3 * 3];
+      }
+    }
+  }
+  const double* operator()(double value) const
+  {
+    const double x = (value - this->lo) * this->scale + .5;
+    const int i = x > 0. ? (x < TableSize - 1. ? static_cast<int>(x) : TableSize - 1) : 0;
+    return &this->entries[static_cast<std::size_t>(3) * i];
+  }
+};
+
 /** What the volume's property makes of values: opacity per unit distance. */
 struct Classifier
 {
@@ -105,32 +146,43 @@ struct Classifier
   bool byGradient[4] = { false, false, false, false };
   Table gradientOpacity[4];
   vtkImageData* transfer2D[4] = { nullptr, nullptr, nullptr, nullptr };
+  bool colored = false;
+  ColorTable color[4];
+  std::vector<std::array<double, 2>> isosurfaces; // value, optical depth across
+  double spacing[3] = { 1., 1., 1. };
 
   // masks
   vtkSmartPointer<vtkDataArray> mask;
   bool labels = false;
   double blend = 1.;
   std::map<int, Table> labelOpacity;
+  std::map<int, vtkColorTransferFunction*> labelColor;
 
   bool needsGradient() const
   {
     return std::any_of(this->byGradient, this->byGradient + 4, [](bool b) { return b; });
   }
 
+  /** RGBA. */
+  const float* lookUp2D(int c, double value, double gradient) const
+  {
+    vtkImageData* function = this->transfer2D[c];
+    int size[3];
+    function->GetDimensions(size);
+    const double range = this->ranges[c][1] - this->ranges[c][0];
+    const double steepest = .25 * range;
+    const double x = range > 0. ? (value - this->ranges[c][0]) / range : 0.;
+    const double y = steepest > 0. ? gradient / steepest : 0.;
+    const auto index = [](double t, int n)
+    { return t > 0. ? (t < 1. ? static_cast<int>(t * n) : n - 1) : 0; };
+    return static_cast<const float*>(
+      function->GetScalarPointer(index(x, size[0]), index(y, size[1]), 0));
+  }
   double opacityOf(int c, double value, double gradient) const
   {
-    if (vtkImageData* function = this->transfer2D[c])
+    if (this->transfer2D[c])
     {
-      int size[3];
-      function->GetDimensions(size);
-      const double range = this->ranges[c][1] - this->ranges[c][0];
-      const double steepest = .25 * range;
-      const double x = range > 0. ? (value - this->ranges[c][0]) / range : 0.;
-      const double y = steepest > 0. ? gradient / steepest : 0.;
-      const auto index = [](double t, int n)
-      { return t > 0. ? (t < 1. ? static_cast<int>(t * n) : n - 1) : 0; };
-      return static_cast<const float*>(
-        function->GetScalarPointer(index(x, size[0]), index(y, size[1]), 0))[3];
+      return this->lookUp2D(c, value, gradient)[3];
     }
     const double a = this->opacity[c](value);
     return this->byGradient[c] ? a * this->gradientOpacity[c](gradient) : a;
@@ -160,14 +212,20 @@ void prepareMask(vtkGPUVolumeRayCastMapper* mapper, vtkVolumeProperty* property,
         classifier.labelOpacity.emplace(
           label, Table(function, classifier.ranges[0][0], classifier.ranges[0][1]));
       }
+      if (vtkColorTransferFunction* color = property->GetLabelColor(label))
+      {
+        classifier.labelColor.emplace(label, color);
+      }
     }
   }
 }
 
-Classifier makeClassifier(
-  vtkGPUVolumeRayCastMapper* mapper, vtkVolumeProperty* property, const Scalars& scalars)
+Classifier makeClassifier(vtkGPUVolumeRayCastMapper* mapper, vtkVolumeProperty* property,
+  const Scalars& scalars, bool colored)
 {
   Classifier classifier;
+  classifier.colored = colored;
+  scalars.image->GetSpacing(classifier.spacing);
   classifier.components = std::min(scalars.array->GetNumberOfComponents(), 4);
   classifier.independent = classifier.components > 1 && property->GetIndependentComponents();
   classifier.opacityComponent = classifier.independent ? 0 : classifier.components - 1;
@@ -193,6 +251,11 @@ Classifier makeClassifier(
       continue;
     }
     classifier.opacity[f] = Table(property->GetScalarOpacity(f), range[0], range[1]);
+    if (colored)
+    {
+      classifier.color[f] = ColorTable(
+        property, f, classifier.ranges[f][0], classifier.ranges[f][1]); // of the first component
+    }
     if (!twoDimensional && property->HasGradientOpacity(f) &&
       !property->GetDisableGradientOpacity(f))
     {
@@ -219,6 +282,16 @@ Classifier makeClassifier(
     }
   }
   prepareMask(mapper, property, scalars, classifier);
+  if (mapper->GetBlendMode() == vtkVolumeMapper::ISOSURFACE_BLEND)
+  {
+    vtkContourValues* contours = property->GetIsoSurfaceValues();
+    for (int i = 0; i < contours->GetNumberOfContours(); ++i)
+    {
+      const double value = contours->GetValue(i);
+      const double alpha = std::min(property->GetScalarOpacity(0)->GetValue(value), MostOpaque);
+      classifier.isosurfaces.push_back({ { value, alpha > 0. ? -std::log1p(-alpha) : 0. } });
+    }
+  }
   return classifier;
 }
 
@@ -302,7 +375,7 @@ struct Worker
   const Cuts& cuts;
   int step;
   int coarse[3];
-  float* sigma_t;
+  float* sigma_t;    // one value, or three
   double axes[3][3]; // world vector from a value to the next, along each grid axis
 
   /** |grad S| times the mean spacing, as VTK's gradient opacity has it. */
@@ -358,9 +431,47 @@ struct Worker
       f.byGradient[function] ? this->gradient(i, j, k, f.independent ? component : 0) : 0.);
   }
 
+  /** An isosurface's depth over the length on which it passes between neighbours. */
+  double surfaces(int i, int j, int k) const
+  {
+    const double here = this->at(i, j, k, 0);
+    double sigma = 0.;
+    for (const auto& isosurface : this->classifier.isosurfaces)
+    {
+      double squares = 0.;
+      for (int a = 0; a < 3; ++a)
+      {
+        double crossings = 0.;
+        for (const int side : { -1, 1 })
+        {
+          int at[3] = { i, j, k };
+          at[a] += side;
+          if (at[a] < 0 || at[a] >= this->scalars.dimensions[a])
+          {
+            continue;
+          }
+          const double there = this->at(at[0], at[1], at[2], 0);
+          if ((here < isosurface[0]) != (there < isosurface[0]) && std::isfinite(here + there))
+          {
+            // Most of it belongs to the nearer of the two points.
+            crossings += 1. - (isosurface[0] - here) / (there - here);
+          }
+        }
+        squares +=
+          crossings * crossings / (this->classifier.spacing[a] * this->classifier.spacing[a]);
+      }
+      sigma += isosurface[1] * std::sqrt(squares);
+    }
+    return sigma;
+  }
+
   double sigma(int i, int j, int k) const
   {
     const Classifier& f = this->classifier;
+    if (!f.isosurfaces.empty())
+    {
+      return this->surfaces(i, j, k);
+    }
     if (f.independent)
     {
       // As VTK composites them, over a short distance.
@@ -392,6 +503,46 @@ struct Worker
     return extinction(alpha, f.unitDistance[0]);
   }
 
+  /** Of red, green and blue. */
+  void shares(int i, int j, int k, double result[3]) const
+  {
+    const Classifier& f = this->classifier;
+    double rgb[3] = { 0., 0., 0. };
+    double total = 0.;
+    for (int c = 0; c < (f.independent ? f.components : 1); ++c)
+    {
+      // As VTK mixes them, by opacity and weight.
+      const double weight = f.independent ? f.weights[c] * this->opacity(i, j, k, c, c) : 1.;
+      const double value = this->at(i, j, k, c);
+      for (int channel = 0; channel < 3; ++channel)
+      {
+        const double own = f.components == 4 && !f.independent
+          ? this->at(i, j, k, channel) * (f.ofRange > 0. ? f.ofRange : 1.)
+          : f.transfer2D[c]
+          ? static_cast<double>(f.lookUp2D(c, value, this->gradient(i, j, k, c))[channel])
+          : f.color[c](value)[channel];
+        rgb[channel] += weight * own;
+      }
+      total += weight;
+    }
+    const auto label =
+      f.labels ? f.labelColor.find(static_cast<int>(this->label(i, j, k))) : f.labelColor.end();
+    if (label != f.labelColor.end())
+    {
+      double own[3];
+      label->second->GetColor(this->at(i, j, k, 0), own);
+      for (int channel = 0; channel < 3; ++channel)
+      {
+        rgb[channel] += f.blend * (total * own[channel] - rgb[channel]);
+      }
+    }
+    for (double& channel : rgb)
+    {
+      channel = total > 0. ? channel / total : 0.;
+    }
+    vtkVisibilityFactorFilter::GetTransportColor(rgb, result);
+  }
+
   double label(int i, int j, int k) const
   {
     const int* n = this->scalars.dimensions;
@@ -413,7 +564,8 @@ struct Worker
       const int ck = static_cast<int>(row / this->coarse[1]);
       for (int ci = 0; ci < this->coarse[0]; ++ci)
       {
-        double sum = 0.;
+        double sum[3] = { 0., 0., 0. };
+        const int channels = this->classifier.colored ? 3 : 1;
         // The first block of each axis is the margin's, before the volume.
         for (int k = this->begin(ck); k < std::min(ck * this->step, n[2]); ++k)
         {
@@ -427,12 +579,25 @@ struct Worker
               {
                 continue;
               }
-              sum += this->sigma(i, j, k);
+              double share[3] = { 1., 1., 1. };
+              const double s = this->sigma(i, j, k);
+              if (channels == 3 && s > 0.)
+              {
+                this->shares(i, j, k, share);
+              }
+              for (int c = 0; c < channels; ++c)
+              {
+                sum[c] += s * share[c];
+              }
             }
           }
         }
         // The last block of a row may reach beyond the volume, where there is nothing.
-        this->sigma_t[row * this->coarse[0] + ci] = static_cast<float>(sum * perBlock);
+        for (int c = 0; c < channels; ++c)
+        {
+          this->sigma_t[(row * this->coarse[0] + ci) * channels + c] =
+            static_cast<float>(sum[c] * perBlock);
+        }
       }
     }
   }
@@ -451,7 +616,7 @@ void compute(const T* values, const Scalars& scalars, const Classifier& classifi
 
 //------------------------------------------------------------------------------
 std::vector<double> VolumeExtinctionKey(
-  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution)
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, bool colored)
 {
   std::vector<double> key;
   const auto object = [&](vtkObject* o)
@@ -468,6 +633,14 @@ std::vector<double> VolumeExtinctionKey(
   object(scalars.image);
   object(scalars.array);
   key.push_back(resolution);
+  key.push_back(colored);
+  key.push_back(mapper->GetBlendMode() == vtkVolumeMapper::ISOSURFACE_BLEND);
+  if (key.back() != 0.)
+  {
+    vtkContourValues* contours = property->GetIsoSurfaceValues();
+    key.insert(
+      key.end(), contours->GetValues(), contours->GetValues() + contours->GetNumberOfContours());
+  }
   key.push_back(property->GetIndependentComponents());
   key.push_back(property->GetTransferFunctionMode());
   const int components = std::min(scalars.array->GetNumberOfComponents(), 4);
@@ -478,6 +651,12 @@ std::vector<double> VolumeExtinctionKey(
     object(property->GetScalarOpacity(c));
     object(property->HasGradientOpacity(c) ? property->GetGradientOpacity(c) : nullptr);
     object(property->GetTransferFunction2D(c));
+    if (colored)
+    {
+      object(property->GetColorChannels(c) == 3
+          ? static_cast<vtkObject*>(property->GetRGBTransferFunction(c))
+          : property->GetGrayTransferFunction(c));
+    }
   }
   if (vtkImageData* mask = mapper->GetMaskInput())
   {
@@ -490,6 +669,7 @@ std::vector<double> VolumeExtinctionKey(
       for (int label = 1; label <= highest; ++label)
       {
         object(property->GetLabelScalarOpacity(label));
+        object(colored ? property->GetLabelColor(label) : nullptr);
       }
     }
   }
@@ -508,15 +688,14 @@ std::vector<double> VolumeExtinctionKey(
 }
 
 //------------------------------------------------------------------------------
-std::string VolumeExtinction(
-  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, vtkImageData* result)
+std::string VolumeExtinction(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution,
+  bool colored, vtkImageData* result)
 {
   result->Initialize();
   Scalars scalars;
   if (!findScalars(mapper, scalars))
   {
-    return "The volume has no image with scalars to compute visibility from; it is lit without "
-           "shadows.";
+    return "the volume has no image with scalars to compute visibility from";
   }
   if (!scalars.array->HasStandardMemoryLayout())
   {
@@ -530,11 +709,10 @@ std::string VolumeExtinction(
     if (!(property->GetScalarOpacityUnitDistance(c) > 0.))
     {
       return "ScalarOpacityUnitDistance is " +
-        std::to_string(property->GetScalarOpacityUnitDistance(c)) +
-        ", expected > 0; the volume is lit without shadows.";
+        std::to_string(property->GetScalarOpacityUnitDistance(c)) + ", expected > 0";
     }
   }
-  const Classifier classifier = makeClassifier(mapper, property, scalars);
+  const Classifier classifier = makeClassifier(mapper, property, scalars, colored);
   const Cuts cuts = makeCuts(mapper, volume, scalars.image);
 
   const int* n = scalars.dimensions;
@@ -558,6 +736,7 @@ std::string VolumeExtinction(
   }
   vtkNew<vtkFloatArray> sigma_t;
   sigma_t->SetName("Extinction");
+  sigma_t->SetNumberOfComponents(colored ? 3 : 1);
   const vtkIdType points = static_cast<vtkIdType>(coarse[0]) * coarse[1] * coarse[2];
   sigma_t->SetNumberOfTuples(points);
   switch (scalars.array->GetDataType())
@@ -565,7 +744,7 @@ std::string VolumeExtinction(
     vtkTemplateMacro(compute(static_cast<const VTK_TT*>(scalars.array->GetVoidPointer(0)), scalars,
       classifier, cuts, step, coarse, axes, sigma_t->GetPointer(0)));
     default:
-      return "The volume's scalars are no numbers; it is lit without shadows.";
+      return "the volume's scalars are no numbers";
   }
   result->SetDimensions(coarse);
   result->SetOrigin(origin);

@@ -15,17 +15,21 @@ class vtkVolume;
 
 /** Everything on which VolumeExtinction depends, to be compared: equal, no need to compute. */
 std::vector<double> VolumeExtinctionKey(
-  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution);
+  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, bool colored);
 
 /**
  * The array "Extinction" (float, 1/length of the data's coordinates) of the volume as the mapper
  * would composite it: scalar and gradient opacity or 2-D transfer functions, components, masks,
  * cropping and clipping, sigma_t = -ln(1 - opacity) / unit distance, the opacity at most 0.9999.
+ * Of isosurfaces: as dense where one passes between two points as makes the depth of the opacity
+ * of its value, across it.
  * On the volume's points, or the means of blocks of them so that at most `resolution` remain along
  * the longest axis, and a margin of one transparent block around: what lies at the border can be
- * seen from outside. NaN is transparent. Returns what is wrong with the input, or nothing.
+ * seen from outside. NaN is transparent. `colored`: of red, green and blue, by the colour that is
+ * drawn (vtkVisibilityFactorFilter::GetTransportColor). Returns what is wrong with the input, or
+ * nothing.
  */
-std::string VolumeExtinction(
-  vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution, vtkImageData* result);
+std::string VolumeExtinction(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int resolution,
+  bool colored, vtkImageData* result);
 
 #endif

@@ -2,22 +2,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "VolumeLighting.h"
 
-#include "VolumeExtinction.h"
 #include "vtkLightTransportCompat.h"
 #include "vtkVisibilityFactorFilter.h"
 
 #include "vtkAbstractMapper.h"
-#include "vtkAlgorithm.h"
 #include "vtkAlgorithmOutput.h"
 #include "vtkCommand.h"
+#include "vtkContourValues.h"
 #include "vtkDataArray.h"
 #include "vtkGPUVolumeRayCastMapper.h"
 #include "vtkImageData.h"
-#include "vtkInformation.h"
 #include "vtkLight.h"
 #include "vtkLightCollection.h"
 #include "vtkMath.h"
-#include "vtkObjectFactory.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLRenderer.h"
 #include "vtkPBRIrradianceTexture.h"
@@ -25,7 +22,6 @@
 #include "vtkRenderer.h"
 #include "vtkSMPTools.h"
 #include "vtkShaderProgram.h"
-#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkTexture.h"
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
@@ -34,6 +30,7 @@
 #include LIGHTTRANSPORT_GL_HEADER
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -44,69 +41,9 @@ namespace
 constexpr int MostUniformLights = 32;
 constexpr int TexelsPerLight = 5;
 
-/** Names of the arrays of vtkVisibilityFactorFilter. */
-constexpr const char* HarmonicsName = "VisibilitySH";
-constexpr const char* ExactName = "Visibility";
-constexpr const char* ExtinctionName = "Extinction";
-
-int bandOf(int component)
-{
-  return static_cast<int>(std::sqrt(static_cast<double>(component) + .5));
-}
-
-/** Errors of the filter become the mapper's. */
-class Collector : public vtkCommand
-{
-public:
-  static Collector* New() { return new Collector; }
-  void Execute(vtkObject*, unsigned long, void* data) override
-  {
-    this->text = static_cast<const char*>(data);
-  }
-  std::string text;
-};
-
 bool isBlack(const double rgb[3])
 {
   return rgb[0] <= 0. && rgb[1] <= 0. && rgb[2] <= 0.;
-}
-
-std::string dimensionsAsString(const int n[3])
-{
-  std::ostringstream text;
-  text << n[0] << " x " << n[1] << " x " << n[2];
-  return text.str();
-}
-
-/** One texture of bytes, linear between its texels; false where the GPU has no room. */
-bool createTexture(vtkTextureObject* texture, vtkOpenGLRenderWindow* window, const int n[3],
-  int components, unsigned char* bytes)
-{
-  while (glGetError() != GL_NO_ERROR)
-  {
-  }
-  texture->ReleaseGraphicsResources(window);
-  texture->SetContext(window);
-  texture->ResetFormatAndType();
-  texture->SetInternalFormat(components == 1 ? GL_R8 : GL_RGBA8);
-  texture->SetWrapS(vtkTextureObject::ClampToEdge);
-  texture->SetWrapT(vtkTextureObject::ClampToEdge);
-  texture->SetWrapR(vtkTextureObject::ClampToEdge);
-  texture->SetMinificationFilter(vtkTextureObject::Linear);
-  texture->SetMagnificationFilter(vtkTextureObject::Linear);
-  if (!texture->Create3DFromRaw(n[0], n[1], n[2], components, VTK_UNSIGNED_CHAR, bytes) ||
-    glGetError() == GL_OUT_OF_MEMORY)
-  {
-    texture->ReleaseGraphicsResources(window);
-    return false;
-  }
-  return true;
-}
-
-unsigned char toByte(double x)
-{
-  // Also 0 for a NaN.
-  return static_cast<unsigned char>(x > 0. ? (x < 1. ? x * 255. + .5 : 255.) : 0.);
 }
 } // namespace
 
@@ -117,12 +54,8 @@ VolumeLighting::~VolumeLighting() = default;
 //------------------------------------------------------------------------------
 void VolumeLighting::SetVisibilityConnection(vtkAlgorithmOutput* output)
 {
-  this->Producer = output ? output->GetProducer() : nullptr;
-  this->Port = output ? output->GetIndex() : 0;
-  this->Visibility = nullptr;
-  this->Exact = nullptr;
-  this->Filter = nullptr;
-  this->ExtinctionKey.clear();
+  this->Visibility.SetConnection(
+    output ? output->GetProducer() : nullptr, output ? output->GetIndex() : 0);
 }
 
 //------------------------------------------------------------------------------
@@ -157,7 +90,10 @@ void VolumeLighting::CollectLights(vtkRenderer* renderer)
     source->GetTransformedPosition(position);
     source->GetTransformedFocalPoint(focus);
     vtkMath::Subtract(focus, position, light.axis);
-    vtkMath::Normalize(light.axis);
+    if (vtkMath::Normalize(light.axis) == 0. && !light.positional)
+    {
+      continue; // from nowhere
+    }
     for (int a = 0; a < 3; ++a)
     {
       light.place[a] = light.positional ? position[a] : -light.axis[a];
@@ -175,277 +111,6 @@ void VolumeLighting::CollectLights(vtkRenderer* renderer)
   }
   std::stable_sort(this->Lights.begin(), this->Lights.end(),
     [](const Light& a, const Light& b) { return a.scene && !b.scene; });
-}
-
-//------------------------------------------------------------------------------
-/** In the data's coordinates, in which the filter computes. */
-void VolumeLighting::SetFilterLights(vtkVolume* volume, int exactLights)
-{
-  vtkNew<vtkMatrix4x4> worldToData;
-  vtkMatrix4x4::Invert(volume->GetMatrix(), worldToData);
-  std::vector<std::array<double, 4>> lights;
-  for (int i = 0; i < exactLights; ++i)
-  {
-    const Light& light = this->Lights[i];
-    const double in[4] = { light.place[0], light.place[1], light.place[2],
-      light.positional ? 1. : 0. };
-    double out[4];
-    worldToData->MultiplyPoint(in, out);
-    const double length = light.positional ? 1. : std::max(vtkMath::Norm(out), 1e-300);
-    lights.push_back({ { out[0] / length, out[1] / length, out[2] / length, in[3] } });
-  }
-  if (lights == this->FilterLights &&
-    this->Filter->GetNumberOfLights() == static_cast<int>(lights.size()))
-  {
-    return;
-  }
-  bool same = lights.size() == this->FilterLights.size() &&
-    this->Filter->GetNumberOfLights() == static_cast<int>(lights.size());
-  for (std::size_t i = 0; same && i < lights.size(); ++i)
-  {
-    same = lights[i][3] == this->FilterLights[i][3];
-  }
-  if (!same)
-  {
-    this->Filter->RemoveAllLights();
-  }
-  for (std::size_t i = 0; i < lights.size(); ++i)
-  {
-    const auto& l = lights[i];
-    if (!same)
-    {
-      l[3] != 0. ? this->Filter->AddPositionalLight(l[0], l[1], l[2])
-                 : this->Filter->AddDirectionalLight(l[0], l[1], l[2]);
-    }
-    else if (l != this->FilterLights[i])
-    {
-      l[3] != 0. ? this->Filter->SetLightPosition(static_cast<int>(i), l[0], l[1], l[2])
-                 : this->Filter->SetLightDirection(static_cast<int>(i), l[0], l[1], l[2]);
-    }
-  }
-  this->FilterLights = lights;
-}
-
-//------------------------------------------------------------------------------
-std::string VolumeLighting::UpdateConnection(vtkVolume* volume, int exactLights)
-{
-  const auto isGood = [](vtkImageData* image, const char* name)
-  {
-    vtkDataArray* array = image ? image->GetPointData()->GetArray(name) : nullptr;
-    return array && array->GetNumberOfTuples() == image->GetNumberOfPoints() &&
-      image->GetNumberOfPoints() > 0;
-  };
-  this->Producer->Update(this->Port);
-  auto* image = vtkImageData::SafeDownCast(this->Producer->GetOutputDataObject(this->Port));
-  this->Visibility = nullptr;
-  this->Exact = nullptr;
-  if (!isGood(image, HarmonicsName))
-  {
-    return std::string("The visibility from ") + this->Producer->GetClassName() +
-      " has no point array \"" + HarmonicsName +
-      "\" with a tuple per point, expected that of a vtkVisibilityFactorFilter; the volume is lit "
-      "without shadows.";
-  }
-  const int components = image->GetPointData()->GetArray(HarmonicsName)->GetNumberOfComponents();
-  this->Order = bandOf(components - 1);
-  if ((this->Order + 1) * (this->Order + 1) != components || this->Order > 4)
-  {
-    return std::string("The visibility's array \"") + HarmonicsName + "\" has " +
-      std::to_string(components) +
-      " components, expected 1, 4, 9, 16 or 25; the volume is lit without shadows.";
-  }
-  this->Visibility = image;
-  if (exactLights > 0 && isGood(image, ExtinctionName))
-  {
-    if (!this->Filter)
-    {
-      this->Filter = vtkSmartPointer<vtkVisibilityFactorFilter>::New();
-      this->Filter->SphericalHarmonicsOff();
-      this->FilterLights.clear();
-    }
-    this->Filter->SetInputData(image);
-    this->SetFilterLights(volume, exactLights);
-    this->Filter->Update();
-    this->Exact = this->Filter->GetOutput();
-  }
-  return std::string();
-}
-
-//------------------------------------------------------------------------------
-std::string VolumeLighting::UpdateVisibility(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume,
-  int exactLights, bool harmonics, bool occlusion)
-{
-  if (this->Producer)
-  {
-    return this->UpdateConnection(volume, exactLights);
-  }
-  std::vector<double> key =
-    VolumeExtinctionKey(mapper, volume, this->Property->GetVisibilityResolution());
-  if (key != this->ExtinctionKey || !this->Filter)
-  {
-    this->ExtinctionKey = key;
-    this->ExtinctionProblem =
-      VolumeExtinction(mapper, volume, this->Property->GetVisibilityResolution(), this->Extinction);
-    this->Extinction->Modified();
-  }
-  this->Visibility = nullptr;
-  this->Exact = nullptr;
-  if (!this->ExtinctionProblem.empty())
-  {
-    return this->ExtinctionProblem;
-  }
-  if (!this->Filter)
-  {
-    this->Filter = vtkSmartPointer<vtkVisibilityFactorFilter>::New();
-    this->Filter->SetInputData(this->Extinction);
-    this->FilterLights.clear();
-  }
-  // Ambient occlusion alone needs the mean alone.
-  const int order = harmonics ? this->Property->GetVisibilityOrder() : 0;
-  this->Filter->SetSphericalHarmonics(harmonics || occlusion);
-  if (harmonics || occlusion)
-  {
-    this->Filter->SetOrder(order);
-  }
-  this->SetFilterLights(volume, exactLights);
-  vtkNew<Collector> collector;
-  const unsigned long tag = this->Filter->AddObserver(vtkCommand::ErrorEvent, collector);
-  vtkDataArray* before = this->UploadedHarmonics;
-  this->Filter->Update();
-  this->Filter->RemoveObserver(tag);
-  vtkImageData* output = this->Filter->GetOutput();
-  vtkPointData* data = output->GetPointData();
-  if (!collector->text.empty() || output->GetNumberOfPoints() == 0)
-  {
-    return "The visibility could not be computed; the volume is lit without shadows. " +
-      collector->text;
-  }
-  if (harmonics || occlusion)
-  {
-    this->Order = order;
-    this->Visibility = output;
-    this->NumberOfComputations += data->GetArray(HarmonicsName) != before ? 1 : 0;
-  }
-  if (exactLights > 0)
-  {
-    this->Exact = output;
-  }
-  return std::string();
-}
-
-//------------------------------------------------------------------------------
-/** Four coefficients a texture, each scaled to its own range in bytes. */
-bool VolumeLighting::UploadHarmonics(vtkOpenGLRenderWindow* window)
-{
-  vtkDataArray* array = this->Visibility->GetPointData()->GetArray(HarmonicsName);
-  if (this->UploadedHarmonics == array && this->UploadedHarmonicsTime == array->GetMTime())
-  {
-    return this->TexturesUsed > 0;
-  }
-  this->UploadedHarmonics = array;
-  this->UploadedHarmonicsTime = array->GetMTime();
-  this->TexturesUsed = 0;
-  int n[3];
-  this->Visibility->GetDimensions(n);
-  const int components = array->GetNumberOfComponents();
-  const vtkIdType points = array->GetNumberOfTuples();
-  this->Scale.assign(4 * MaxTextures, 0.);
-  this->Shift.assign(4 * MaxTextures, 0.);
-  for (int c = 0; c < components; ++c)
-  {
-    double range[2];
-    array->GetFiniteRange(range, c);
-    this->Shift[c] = range[0];
-    this->Scale[c] = std::max(range[1] - range[0], 1e-12);
-  }
-  ++this->NumberOfUploads;
-  std::vector<unsigned char> bytes;
-  const int textures = (components + 3) / 4;
-  const auto* floats = array->GetDataType() == VTK_FLOAT && array->HasStandardMemoryLayout()
-    ? static_cast<const float*>(array->GetVoidPointer(0))
-    : nullptr;
-  for (int t = 0; t < textures; ++t)
-  {
-    const int here = std::min(components - 4 * t, 4);
-    const int channels = here == 1 ? 1 : 4;
-    bytes.assign(static_cast<std::size_t>(points) * channels, 0);
-    vtkSMPTools::For(0, points, 65536,
-      [&](vtkIdType begin, vtkIdType end)
-      {
-        for (vtkIdType i = begin; i < end; ++i)
-        {
-          for (int k = 0; k < here; ++k)
-          {
-            const int c = 4 * t + k;
-            const double value = floats ? floats[i * components + c] : array->GetComponent(i, c);
-            bytes[i * channels + k] = toByte((value - this->Shift[c]) / this->Scale[c]);
-          }
-        }
-      });
-    if (!createTexture(this->HarmonicsTextures[t], window, n, channels, bytes.data()))
-    {
-      return false;
-    }
-  }
-  this->TexturesUsed = textures;
-  return true;
-}
-
-//------------------------------------------------------------------------------
-/** The visibility of one light a channel, or the mean visibility in the last. */
-bool VolumeLighting::UploadExact(vtkOpenGLRenderWindow* window, int exactLights, bool occlusion)
-{
-  vtkImageData* image = this->Exact ? this->Exact : this->Visibility;
-  vtkDataArray* exact =
-    exactLights > 0 ? this->Exact->GetPointData()->GetArray(ExactName) : nullptr;
-  // Harmonics of order 0 are the mean times sqrt(4 pi).
-  vtkDataArray* mean =
-    occlusion ? this->Visibility->GetPointData()->GetArray(HarmonicsName) : nullptr;
-  if ((exactLights > 0 && (!exact || exact->GetNumberOfComponents() < exactLights)) ||
-    (mean && mean->GetNumberOfTuples() != image->GetNumberOfPoints()))
-  {
-    return false;
-  }
-  if (this->ExactUsed && this->UploadedExact == exact && this->UploadedOcclusion == mean &&
-    (!exact || this->UploadedExactTime == exact->GetMTime()) &&
-    (!mean || this->UploadedOcclusionTime == mean->GetMTime()))
-  {
-    return true;
-  }
-  this->UploadedExact = exact;
-  this->UploadedExactTime = exact ? exact->GetMTime() : 0;
-  this->UploadedOcclusion = mean;
-  this->UploadedOcclusionTime = mean ? mean->GetMTime() : 0;
-  int n[3];
-  image->GetDimensions(n);
-  const vtkIdType points = image->GetNumberOfPoints();
-  std::vector<unsigned char> bytes(static_cast<std::size_t>(points) * 4, 255);
-  const int own = exact ? exact->GetNumberOfComponents() : 0;
-  const auto floatsOf = [](vtkDataArray* array)
-  {
-    return array && array->GetDataType() == VTK_FLOAT && array->HasStandardMemoryLayout()
-      ? static_cast<const float*>(array->GetVoidPointer(0))
-      : nullptr;
-  };
-  const float* fast = floatsOf(exact);
-  vtkSMPTools::For(0, points, 65536,
-    [&](vtkIdType begin, vtkIdType end)
-    {
-      for (vtkIdType i = begin; i < end; ++i)
-      {
-        for (int c = 0; c < std::min(own, 4); ++c)
-        {
-          bytes[4 * i + c] = toByte(fast ? fast[i * own + c] : exact->GetComponent(i, c));
-        }
-        if (mean)
-        {
-          bytes[4 * i + 3] = toByte(mean->GetComponent(i, 0) / std::sqrt(4. * vtkMath::Pi()));
-        }
-      }
-    });
-  ++this->NumberOfUploads;
-  this->ExactUsed = createTexture(this->ExactTexture, window, n, 4, bytes.data());
-  return this->ExactUsed;
 }
 
 //------------------------------------------------------------------------------
@@ -721,8 +386,8 @@ void VolumeLighting::ProjectEnvironment(vtkRenderer* renderer, int values)
       double constant = values == 0 ? at(color, 0, k) : 0.;
       for (int j = 0; j < values; ++j)
       {
-        rows[4 * j + k] = static_cast<float>(at(color, j, k) * this->Scale[j]);
-        constant += at(color, j, k) * this->Shift[j];
+        rows[4 * j + k] = static_cast<float>(at(color, j, k) * this->Visibility.GetScale(j));
+        constant += at(color, j, k) * this->Visibility.GetShift(j);
       }
       rows[4 * values + k] = static_cast<float>(constant);
     }
@@ -772,7 +437,7 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     this->Window = window;
   }
 
-  // What is needed: surfaces of an isosurface have no extinction that could shadow.
+  // What is needed.
   this->CollectLights(renderer);
   const int lights = static_cast<int>(this->Lights.size());
   int components = 1;
@@ -792,10 +457,6 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     ambient = std::max(ambient, material->GetAmbient(c));
   }
   int shadow = property->GetShadowMode();
-  if (blend == vtkVolumeMapper::ISOSURFACE_BLEND && !this->Producer)
-  {
-    shadow = vtkVolumeLightingProperty::NoShadows;
-  }
   if (shadow == vtkVolumeLightingProperty::RayTraced && partitioned)
   {
     shadow = vtkVolumeLightingProperty::Precomputed; // a ray sees its own block alone
@@ -805,81 +466,49 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     shadow == vtkVolumeLightingProperty::Precomputed && property->GetShadowStrength() > 0.;
   const bool environment = property->GetEnvironmentStrength() > 0.;
   const bool occlusion = shadows && property->GetAmbientOcclusion() > 0. && ambient > 0.;
-  int exactLights = 0;
-  while (precomputed && exactLights < std::min(lights, property->GetNumberOfExactLights()) &&
-    this->Lights[exactLights].scene)
+  vtkMatrix4x4::Invert(volume->GetMatrix(), this->WorldToData);
+  VolumeVisibility::Needs needs;
+  needs.mapper = mapper;
+  needs.volume = volume;
+  needs.resolution = property->GetVisibilityResolution();
+  needs.colored = property->GetColoredShadows();
+  needs.order = property->GetVisibilityOrder();
+  needs.mean = occlusion;
+  const int exactLights = precomputed ? std::min(lights, property->GetNumberOfExactLights()) : 0;
+  for (int i = 0; i < exactLights; ++i)
   {
-    ++exactLights;
+    const Light& light = this->Lights[i];
+    const double in[4] = { light.place[0], light.place[1], light.place[2],
+      light.positional ? 1. : 0. };
+    std::array<double, 4> out;
+    this->WorldToData->MultiplyPoint(in, out.data());
+    const double length = light.positional ? 1. : std::max(vtkMath::Norm(out.data()), 1e-300);
+    needs.lights.push_back({ { out[0] / length, out[1] / length, out[2] / length, in[3] } });
   }
-  const bool harmonics = (precomputed && lights > exactLights) || (shadows && environment);
+  needs.harmonics = (precomputed && lights > exactLights) || (shadows && environment);
 
   // The visibility, on the CPU and on the GPU.
-  bool hasHarmonics = false;
-  bool hasExact = false;
-  int occlusionFrom = 0;
-  if (harmonics || occlusion || exactLights > 0)
+  bool looksUp = needs.harmonics || needs.mean || exactLights > 0;
+  if (looksUp)
   {
-    problem = this->UpdateVisibility(mapper, volume, exactLights, harmonics, occlusion);
-    if (this->Producer && !this->Exact)
+    problem = this->Visibility.Prepare(window, needs);
+    if (!problem.empty())
     {
-      exactLights = 0; // a connection without extinction: the harmonics have them all
-    }
-    if (problem.empty())
-    {
-      int n[3];
-      (this->Visibility ? this->Visibility : this->Exact)->GetDimensions(n);
-      const int limit = vtkTextureObject::GetMaximumTextureSize3D(window);
-      if (limit > 0 && *std::max_element(n, n + 3) > limit)
-      {
-        problem = "The visibility has " + dimensionsAsString(n) + " points, expected at most " +
-          std::to_string(limit) +
-          " along each axis, the limit of this GPU's 3-D textures; the "
-          "volume is lit without shadows.";
-      }
-      else
-      {
-        window->MakeCurrent();
-        // The mean goes with the exact fields if no direction is needed.
-        const bool meanWithExact = occlusion && !harmonics && !this->Producer && exactLights < 4;
-        const bool needsHarmonics =
-          this->Visibility && !meanWithExact && (harmonics || occlusion || exactLights < lights);
-        hasHarmonics = needsHarmonics && this->UploadHarmonics(window);
-        hasExact = (exactLights > 0 || meanWithExact) &&
-          this->UploadExact(window, exactLights, meanWithExact);
-        occlusionFrom = meanWithExact ? (hasExact ? 1 : 0) : occlusion && hasHarmonics ? 2 : 0;
-        if (needsHarmonics != hasHarmonics || (exactLights > 0 && !hasExact))
-        {
-          problem = "The GPU has no room for the visibility of " + dimensionsAsString(n) +
-            " points; set a smaller VisibilityResolution. The volume is lit with fewer shadows.";
-        }
-      }
+      problem[0] = static_cast<char>(std::toupper(problem[0]));
+      problem += "; the volume is lit without shadows.";
+      looksUp = false;
     }
   }
-  this->ExactLights = hasExact ? exactLights : 0;
-  const int textures = hasHarmonics ? this->TexturesUsed : 0;
+  const int textures = looksUp ? this->Visibility.NumberOfHarmonics() : 0;
+  this->ExactLights = looksUp ? this->Visibility.NumberOfExactLights() : 0;
 
   // Directions and places.
-  vtkMatrix4x4::Invert(volume->GetMatrix(), this->WorldToData);
   const double scale = std::cbrt(std::abs(volume->GetMatrix()->Determinant()));
   for (int i = 0; i < 9; ++i)
   {
     this->WorldToData->SetElement(
       i / 3, i % 3, this->WorldToData->GetElement(i / 3, i % 3) * (scale > 0. ? scale : 1.));
   }
-  if (vtkImageData* grid = hasExact && this->Exact ? this->Exact : this->Visibility)
-  {
-    int extent[6];
-    grid->GetExtent(extent);
-    vtkNew<vtkMatrix4x4> indexToVC;
-    for (int a = 0; a < 3; ++a)
-    {
-      const double n = extent[2 * a + 1] - extent[2 * a] + 1;
-      indexToVC->SetElement(a, a, 1. / n);
-      indexToVC->SetElement(a, 3, (.5 - extent[2 * a]) / n);
-    }
-    vtkMatrix4x4::Multiply4x4(indexToVC, grid->GetPhysicalToIndexMatrix(), this->DatasetToVC);
-  }
-
   this->LightsInTexture = lights > MostUniformLights;
   // Exact up to 8, so that the shader's loop is unrolled; then in steps, padded with black.
   this->Capacity = lights <= 8 ? lights : (lights + 7) / 8 * 8;
@@ -936,11 +565,14 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
   define("LT_LIGHTS", this->Capacity);
   define("LT_LIGHT_TEXTURE", this->LightsInTexture);
   define("LT_POSITIONAL", positional);
-  define("LT_SHADOW",
-    property->GetShadowStrength() > 0. && (shadow != 1 || hasExact || hasHarmonics) ? shadow : 0);
-  define("LT_EXACT", this->ExactLights);
-  define("LT_HARMONICS", textures);
-  define("LT_OCCLUSION", occlusionFrom);
+  const bool casts = property->GetShadowStrength() > 0. &&
+    (shadow == vtkVolumeLightingProperty::RayTraced || this->ExactLights > 0 || textures > 0);
+  define("LT_SHADOW", casts ? shadow : 0);
+  text << (looksUp
+      ? this->Visibility.Defines()
+      : std::string("#define LT_EXACT 0\n#define LT_EXACT_TEXTURES 0\n#define LT_HARMONICS 0\n"
+                    "#define LT_MEAN 0\n#define LT_RGB ") +
+        (casts && needs.colored ? "1\n" : "0\n"));
   define("LT_ENVIRONMENT", environment);
   define("LT_PBR", property->GetShadingModel() == vtkVolumeLightingProperty::PhysicallyBased);
   define("LT_ISOTROPIC", property->GetAnisotropy() == 0.);
@@ -950,6 +582,10 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
   define("LT_TRANSFER_2D", twoDimensional);
   define("LT_COMPONENTS", components);
   define("LT_INDEPENDENT", independent);
+  const bool isosurface = blend == vtkVolumeMapper::ISOSURFACE_BLEND;
+  const int contours = material->GetIsoSurfaceValues()->GetNumberOfContours();
+  define("LT_BLEND_ISOSURFACE", isosurface && contours > 0);
+  define("LT_CONTOURS", isosurface ? contours : 0);
   define("LT_CROPPING", mapper->GetCropping() != 0);
   define("LT_CLIPPING", mapper->GetClippingPlanes() != nullptr);
   define("LT_MASK", mapper->GetMaskInput() ? (labels ? 2 : 1) : 0);
@@ -1017,12 +653,8 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
   {
     program->SetUniform4f("in_ltGradientThreshold", this->Thresholds);
   }
-  sampler("in_ltExact", this->ExactTexture);
-  for (int t = 0; t < MaxTextures; ++t)
-  {
-    sampler("in_ltHarmonics" + std::to_string(t), this->HarmonicsTextures[t]);
-  }
-  matrix("in_ltDatasetToVC", this->DatasetToVC);
+  this->Visibility.SetUniforms(program);
+  matrix("in_ltDatasetToVC", this->Visibility.GetDataToGrid());
   matrix("in_ltWorldToData", this->WorldToData);
 
   if (this->LightsInTexture)
@@ -1034,23 +666,12 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
     vectors("in_ltLights", this->UploadedLights);
   }
 
-  const int textures = this->TexturesUsed;
-  if (program->IsUniformUsed("in_ltLightHarmonics") ||
-    program->IsUniformUsed("in_ltHarmonicsScale"))
+  const int textures = this->Visibility.NumberOfHarmonics();
+  if (program->IsUniformUsed("in_ltLightHarmonics"))
   {
     // Windowed, and linear in the stored values.
-    std::vector<double> window(5, 0.);
-    vtkVisibilityFactorFilter::GetWindow(this->Order, window.data());
-    std::vector<float> scale(static_cast<std::size_t>(4) * textures, 0.F);
-    std::vector<float> shift(scale.size(), 0.F);
-    const int components = (this->Order + 1) * (this->Order + 1);
-    for (int c = 0; c < components; ++c)
-    {
-      scale[c] = static_cast<float>(window[bandOf(c)] * this->Scale[c]);
-      shift[c] = static_cast<float>(window[bandOf(c)] * this->Shift[c]);
-    }
-    vectors("in_ltHarmonicsScale", scale);
-    vectors("in_ltHarmonicsShift", shift);
+    const int order = this->Visibility.GetOrder();
+    const int components = (order + 1) * (order + 1);
     std::vector<float> rows;
     for (int i = this->ExactLights; i < this->Capacity; ++i)
     {
@@ -1066,12 +687,13 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
       this->WorldToData->MultiplyPoint(in, data);
       vtkMath::Normalize(data);
       double Y[25];
-      vtkVisibilityFactorFilter::GetHarmonics(this->Order, data, Y);
+      vtkVisibilityFactorFilter::GetHarmonics(order, data, Y);
       double constant = 0.;
       for (int c = 0; c < components; ++c)
       {
-        rows[first + c] = static_cast<float>(Y[c] * scale[c]);
-        constant += Y[c] * shift[c];
+        const double y = this->Visibility.GetWindow(c) * Y[c];
+        rows[first + c] = static_cast<float>(y * this->Visibility.GetScale(c));
+        constant += y * this->Visibility.GetShift(c);
       }
       rows[first + static_cast<std::size_t>(4) * textures] = static_cast<float>(constant);
     }
@@ -1087,28 +709,15 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
 //------------------------------------------------------------------------------
 void VolumeLighting::Deactivate()
 {
-  this->ExactTexture->Deactivate();
+  this->Visibility.Deactivate();
   this->LightTexture->Deactivate();
-  for (auto& texture : this->HarmonicsTextures)
-  {
-    texture->Deactivate();
-  }
 }
 
 //------------------------------------------------------------------------------
 void VolumeLighting::Release(vtkWindow* window)
 {
-  this->ExactTexture->ReleaseGraphicsResources(window);
+  this->Visibility.Release(window);
   this->LightTexture->ReleaseGraphicsResources(window);
-  for (auto& texture : this->HarmonicsTextures)
-  {
-    texture->ReleaseGraphicsResources(window);
-  }
-  this->UploadedHarmonics = nullptr;
-  this->UploadedExact = nullptr;
-  this->UploadedOcclusion = nullptr;
   this->UploadedLights.clear();
-  this->TexturesUsed = 0;
-  this->ExactUsed = false;
   this->Window = nullptr;
 }

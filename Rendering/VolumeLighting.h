@@ -4,27 +4,23 @@
 #ifndef VolumeLighting_h
 #define VolumeLighting_h
 
-#include "vtkImageData.h" // for smart pointers
+#include "VolumeVisibility.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkSmartPointer.h"
 #include "vtkTextureObject.h"
 #include "vtkVolumeLightingProperty.h"
 
-#include <array>
 #include <string>
 #include <vector>
 
-class vtkAlgorithm;
 class vtkAlgorithmOutput;
-class vtkDataArray;
 class vtkGPUVolumeRayCastMapper;
 class vtkLight;
 class vtkOpenGLRenderWindow;
 class vtkRenderer;
 class vtkShaderProgram;
 class vtkTexture;
-class vtkVisibilityFactorFilter;
 class vtkVolume;
 
 /**
@@ -56,11 +52,8 @@ public:
   void Deactivate();
   void Release(vtkWindow* window);
 
-  int NumberOfUploads = 0;
-  int NumberOfComputations = 0; // of the harmonics
-
-  /** The visibility last used, or nullptr. */
-  vtkImageData* GetVisibility() const { return this->Visibility; }
+  int NumberOfUploads() const { return this->Visibility.Uploads; }
+  int NumberOfComputations() const { return this->Visibility.Computations; } // of the harmonics
 
 private:
   struct Light
@@ -84,55 +77,22 @@ private:
   };
 
   void CollectLights(vtkRenderer* renderer);
-  std::string UpdateVisibility(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume,
-    int exactLights, bool harmonics, bool occlusion);
-  std::string UpdateConnection(vtkVolume* volume, int exactLights);
-  void SetFilterLights(vtkVolume* volume, int exactLights);
-  bool UploadHarmonics(vtkOpenGLRenderWindow* window);
-  bool UploadExact(vtkOpenGLRenderWindow* window, int exactLights, bool occlusion);
   void UploadLights(vtkOpenGLRenderWindow* window);
   void ReadEnvironment(vtkRenderer* renderer);
   void ProjectEnvironment(vtkRenderer* renderer, int values);
   double AutomaticThreshold(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, int component);
 
+  VolumeVisibility Visibility{ false };
   std::vector<Light> Lights; // the exact ones first
   int ExactLights = 0;
   int Capacity = 0;
   bool LightsInTexture = false;
-
-  // CPU
-  vtkNew<vtkImageData> Extinction;
-  vtkSmartPointer<vtkVisibilityFactorFilter> Filter;
-  std::vector<double> ExtinctionKey;
-  std::string ExtinctionProblem;
-  std::vector<std::array<double, 4>> FilterLights;
-  vtkSmartPointer<vtkAlgorithm> Producer;
-  int Port = 0;
-  vtkSmartPointer<vtkImageData> Visibility; // with VisibilitySH
-  vtkSmartPointer<vtkImageData> Exact;      // with Visibility; the same grid
-  int Order = 0;
-
-  // GPU
-  static constexpr int MaxTextures = 7;
-  vtkNew<vtkTextureObject> HarmonicsTextures[MaxTextures];
-  vtkNew<vtkTextureObject> ExactTexture;
   vtkNew<vtkTextureObject> LightTexture;
   vtkOpenGLRenderWindow* Window = nullptr; // compared, never used
-  vtkSmartPointer<vtkDataArray> UploadedHarmonics;
-  vtkMTimeType UploadedHarmonicsTime = 0;
-  vtkSmartPointer<vtkDataArray> UploadedExact;
-  vtkMTimeType UploadedExactTime = 0;
-  vtkSmartPointer<vtkDataArray> UploadedOcclusion;
-  vtkMTimeType UploadedOcclusionTime = 0;
   std::vector<float> UploadedLights;
-  int TexturesUsed = 0;
-  bool ExactUsed = false;
-  std::vector<double> Scale; // stored value -> coefficient, per component
-  std::vector<double> Shift;
 
   // the frame's
   std::string DefinesOfFrame;
-  vtkNew<vtkMatrix4x4> DatasetToVC;
   vtkNew<vtkMatrix4x4> WorldToData;
   float SurfaceOffset[2] = { 0.F, 0.F }; // world, data
   float Thresholds[4] = { 1.F, 1.F, 1.F, 1.F };

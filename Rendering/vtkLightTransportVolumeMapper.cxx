@@ -7,9 +7,11 @@
 #include "vtkLightFieldProperty.h"
 #include "vtkLightTransportArrays.h"
 #include "vtkLightTransportCompat.h"
+#include "vtkLightTransportVisibility.h"
 #include "vtkLightTransportVolumeMapperDec.h"
 #include "vtkLightTransportVolumeMapperLighting.h"
 #include "vtkLightTransportVolumeMapperLightingDec.h"
+#include "vtkLightTransportVolumeMapperLightingEnd.h"
 #include "vtkLightTransportVolumeMapperRay.h"
 #include "vtkLightTransportVolumeMapperRayBegin.h"
 #include "vtkLightTransportVolumeMapperRayEnd.h"
@@ -47,8 +49,10 @@
 #include "vtkTrivialProducer.h"
 #include "vtkVersion.h"
 #include "vtkVolume.h"
+#include "vtkVolumeInputHelper.h"
 #include "vtkVolumeLightingProperty.h"
 #include "vtkVolumeProperty.h"
+#include "vtkVolumeTexture.h"
 
 // GLEW or glad, by VTK's version.
 #include LIGHTTRANSPORT_GL_HEADER
@@ -340,9 +344,10 @@ bool vtkLightTransportVolumeMapper::vtkShaderPass::PreReplaceShaderValues(
   }
   if (self.HasLighting)
   {
+    declarations += vtkLightTransportVisibility;
     declarations += vtkLightTransportVolumeMapperLightingDec;
     lighting = vtkLightTransportVolumeMapperLighting;
-    colorEnd = "\n#undef clamp\n";
+    colorEnd = std::string("\n") + vtkLightTransportVolumeMapperLightingEnd;
     initialization += "  ltInitLighting(ltTCToData());\n";
   }
 
@@ -699,13 +704,13 @@ void vtkLightTransportVolumeMapper::SetVisibilityConnection(vtkAlgorithmOutput* 
 //------------------------------------------------------------------------------
 int vtkLightTransportVolumeMapper::GetNumberOfVisibilityUploads()
 {
-  return this->Internals->Lighting.NumberOfUploads;
+  return this->Internals->Lighting.NumberOfUploads();
 }
 
 //------------------------------------------------------------------------------
 int vtkLightTransportVolumeMapper::GetNumberOfVisibilityComputations()
 {
-  return this->Internals->Lighting.NumberOfComputations;
+  return this->Internals->Lighting.NumberOfComputations();
 }
 
 //------------------------------------------------------------------------------
@@ -968,6 +973,25 @@ void vtkLightTransportVolumeMapper::RenderWithCurvature(vtkRenderer* renderer, v
 }
 
 //------------------------------------------------------------------------------
+/** What the last frame shows: SetPartitions of the superclass is not virtual. */
+bool vtkLightTransportVolumeMapper::IsInBlocks()
+{
+  for (auto& input : this->AssembledInputs)
+  {
+    vtkVolumeTexture* texture = input.second.Texture;
+    if (texture)
+    {
+      const auto& parts = texture->GetPartitions();
+      if (parts[0] > 1 || parts[1] > 1 || parts[2] > 1)
+      {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+//------------------------------------------------------------------------------
 void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* volume)
 {
   vtkInternals& self = *this->Internals;
@@ -986,7 +1010,8 @@ void vtkLightTransportVolumeMapper::GPURender(vtkRenderer* renderer, vtkVolume* 
     const bool skips =
       !self.HasField || self.Property->GetMode() == vtkLightFieldProperty::Illuminate;
     const bool partitioned =
-      std::any_of(self.Partitions, self.Partitions + 3, [](int parts) { return parts > 1; });
+      std::any_of(self.Partitions, self.Partitions + 3, [](int parts) { return parts > 1; }) ||
+      this->IsInBlocks();
     self.HasLighting =
       self.Lighting.Prepare(this, renderer, volume, self.HasField, skips, partitioned, problem);
     if (self.HasLighting && problem != self.LastLightingProblem)

@@ -205,6 +205,7 @@ private:
   std::unique_ptr<vtkInternals> Internals;
 
   bool VolumeFits(vtkRenderer* renderer);
+  bool IsInBlocks();
   bool CanBeLit(vtkRenderer* renderer, vtkVolume* volume);
   bool PrepareField(vtkRenderer* renderer);
   void ReportOnce(const std::string& problem);

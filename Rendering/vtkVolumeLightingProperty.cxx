@@ -144,7 +144,7 @@ void vtkVolumeLightingProperty::SetEnvironmentStrength(double strength)
 //------------------------------------------------------------------------------
 void vtkVolumeLightingProperty::SetNumberOfExactLights(int number)
 {
-  number = std::min(std::max(number, 0), 4);
+  number = std::min(std::max(number, 0), 8);
   if (this->NumberOfExactLights != number)
   {
     this->NumberOfExactLights = number;
@@ -181,6 +181,7 @@ void vtkVolumeLightingProperty::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Strength: " << this->Strength << "\n";
   os << indent << "ShadowMode: " << this->GetShadowModeAsString() << "\n";
   os << indent << "ShadowStrength: " << this->ShadowStrength << "\n";
+  os << indent << "ColoredShadows: " << (this->ColoredShadows ? "on" : "off") << "\n";
   os << indent << "ShadingModel: " << this->GetShadingModelAsString() << "\n";
   os << indent << "Roughness: " << this->Roughness << "\n";
   os << indent << "Metallic: " << this->Metallic << "\n";

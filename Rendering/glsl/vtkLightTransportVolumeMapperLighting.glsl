@@ -4,7 +4,7 @@
 // Tag:     VTK::ComputeLighting::Dec, after it.
 // Needs:   the declarations of the lighting; LT_MIXED 1 for a strength between 0 and 1,
 //          LT_GRADIENT_OPACITY, LT_TRANSFER_2D 1 where the volume has these, LT_COMPONENTS how
-//          many, LT_INDEPENDENT, LT_CROPPING, LT_CLIPPING, LT_MASK (0 none, 1 binary, 2 labels),
+//          many, LT_INDEPENDENT, LT_BLEND_ISOSURFACE, LT_CONTOURS how many, LT_CROPPING, LT_CLIPPING, LT_MASK (0 none, 1 binary, 2 labels),
 //          LT_DEFERRED; VTK's g_dataPos, computeOpacity, computeGradient.
 // Defines: computeLighting, which VTK's computeColor calls, in the place of VTK's.
 #undef computeLighting
@@ -26,8 +26,8 @@ vec3 ltGradient(vec3 positionTC, int component)
 }
 
 #if LT_SHADOW == 2
-// The opacity over a sample distance of what is drawn at a place.
-float ltOpacityAt(vec3 positionTC)
+// Whether clipping, cropping and a binary mask leave a place.
+bool ltIsThere(vec3 positionTC)
 {
 #if LT_CLIPPING
   vec4 positionWC = clip_texToObjMat * vec4(positionTC, 1.0);
@@ -37,26 +37,76 @@ float ltOpacityAt(vec3 positionTC)
     vec3 normal = vec3(in_clippingPlanes[i + 4], in_clippingPlanes[i + 5], in_clippingPlanes[i + 6]);
     if (dot(origin - positionWC.xyz, normal) > 0.0)
     {
-      return 0.0;
+      return false;
     }
   }
 #endif
 #if LT_CROPPING
   if (in_croppingFlags[computeRegion(croppingPlanesTexture, positionTC)] == 0)
   {
-    return 0.0;
+    return false;
   }
 #endif
 #if LT_MASK == 1
   if (texture3D(in_mask, positionTC).r <= 0.0)
   {
-    return 0.0;
+    return false;
   }
 #endif
+  return true;
+}
+
+vec4 ltScalarAt(vec3 positionTC)
+{
   vec4 scalar = texture3D(in_volume[0], positionTC) * in_volume_scale[0] + in_volume_bias[0];
 #if LT_COMPONENTS == 1
   scalar = vec4(scalar.r);
 #endif
+  return scalar;
+}
+
+// What matter of this opacity lets through, in colours by its own (Kniss's transport colour).
+#if LT_RGB
+vec3 ltColorOf(vec4 scalar, int component); // where VTK's tables are declared
+vec3 ltPasses(float opacity, vec3 color)
+{
+  vec3 shares = 1.1 - clamp(color, 0.0, 1.0);
+  shares *= 3.0 / (shares.r + shares.g + shares.b);
+  return pow(vec3(max(1.0 - opacity, 0.0)), shares);
+}
+#define LT_COLOR_OF(scalar, component) ltColorOf(scalar, component)
+#else
+#define ltPasses(opacity, color) (1.0 - (opacity))
+#define LT_COLOR_OF(scalar, component) vec3(0.0)
+#endif
+
+#if LT_BLEND_ISOSURFACE
+// From a sample to the next, each surface between them once.
+ltVisible ltPassesAt(vec3 positionTC, inout float last)
+{
+  ltVisible passes = ltVisible(1.0);
+  vec4 scalar = ltScalarAt(positionTC);
+  float range = in_scalarsRange[0].y - in_scalarsRange[0].x;
+  for (int i = 0; i < LT_CONTOURS; ++i)
+  {
+    float s = (in_isosurfacesValues[i] - in_scalarsRange[0].x) / range;
+    if ((last < s) != (scalar.r < s) && ltIsThere(positionTC))
+    {
+      passes *= ltPasses(computeOpacity(vec4(s)), LT_COLOR_OF(vec4(s), 0));
+    }
+  }
+  last = scalar.r;
+  return passes;
+}
+#else
+// Over a sample distance.
+ltVisible ltPassesAt(vec3 positionTC)
+{
+  if (!ltIsThere(positionTC))
+  {
+    return ltVisible(1.0);
+  }
+  vec4 scalar = ltScalarAt(positionTC);
 #if LT_TRANSFER_2D
   for (int c = 0; c < (LT_INDEPENDENT ? LT_COMPONENTS : 1); ++c)
   {
@@ -66,15 +116,22 @@ float ltOpacityAt(vec3 positionTC)
 #if LT_COMPONENTS > 1 && LT_INDEPENDENT
   float total = 0.0;
   float squares = 0.0;
+  vec3 color = vec3(0.0);
   for (int c = 0; c < LT_COMPONENTS; ++c)
   {
     float opacity = computeOpacity(scalar, c);
+#if LT_GRADIENT_OPACITY
+    opacity *= computeGradientOpacity(computeGradient(positionTC, c, in_volume[0], 0), c);
+#endif
     total += opacity * in_componentWeight[c];
     squares += in_componentWeight[c] > 0.0 ? opacity * opacity : 0.0;
+    color += opacity * in_componentWeight[c] * LT_COLOR_OF(scalar, c);
   }
-  return total > 0.0 ? min(squares / total, 1.0) : 0.0; // as VTK composites them
+  // as VTK composites them
+  return total > 0.0 ? ltPasses(min(squares / total, 1.0), color / total) : ltVisible(1.0);
 #else
   float opacity = computeOpacity(scalar);
+  vec3 color = LT_COLOR_OF(scalar, 0);
 #if LT_GRADIENT_OPACITY
   opacity *= computeGradientOpacity(computeGradient(positionTC, 0, in_volume[0], 0));
 #endif
@@ -85,16 +142,18 @@ float ltOpacityAt(vec3 positionTC)
     : 0.0;
   if (label != 0.0)
   {
-    opacity = mix(opacity, texture2D(in_labelMapTransfer, vec2(scalar.r, label)).a,
-      in_maskBlendFactor);
+    vec4 own = texture2D(in_labelMapTransfer, vec2(scalar.r, label));
+    opacity = mix(opacity, own.a, in_maskBlendFactor);
+    color = mix(color, own.rgb, in_maskBlendFactor);
   }
 #endif
-  return opacity;
+  return ltPasses(opacity, color);
 #endif
 }
+#endif
 
 // What gets through from a place towards l, as far as `reach`: midpoint rule.
-float ltTransmittance(vec3 positionTC, vec3 l, float reach)
+ltVisible ltTransmittance(vec3 positionTC, vec3 l, float reach)
 {
   vec3 perLengthTC = g_ltWCToTC * l;
   vec3 toFaces = (step(vec3(0.0), perLengthTC) - positionTC) /
@@ -102,7 +161,7 @@ float ltTransmittance(vec3 positionTC, vec3 l, float reach)
   float end = min(min(reach, toFaces.x), min(toFaces.y, toFaces.z));
   // The sample distance is one of the data's coordinates, as VTK's rays have it.
   float stepWC = in_sampleDistance / length(mat3(in_inverseVolumeMatrix[0]) * l);
-  float transmittance = 1.0;
+  ltVisible transmittance = ltVisible(1.0);
 #if LT_TRANSFER_2D
   vec4 gradients[4];
   for (int c = 0; c < (LT_INDEPENDENT ? LT_COMPONENTS : 1); ++c)
@@ -110,9 +169,16 @@ float ltTransmittance(vec3 positionTC, vec3 l, float reach)
     gradients[c] = g_gradients_0[c];
   }
 #endif
-  for (float t = 0.5 * stepWC; t < end && transmittance > 0.002; t += stepWC)
+#if LT_BLEND_ISOSURFACE
+  float last = ltScalarAt(positionTC).r;
+#endif
+  for (float t = 0.5 * stepWC; t < end && dot(transmittance, ltVisible(1.0)) > 0.002; t += stepWC)
   {
-    transmittance *= 1.0 - ltOpacityAt(positionTC + t * perLengthTC);
+#if LT_BLEND_ISOSURFACE
+    transmittance *= ltPassesAt(positionTC + t * perLengthTC, last);
+#else
+    transmittance *= ltPassesAt(positionTC + t * perLengthTC);
+#endif
   }
 #if LT_TRANSFER_2D
   for (int c = 0; c < (LT_INDEPENDENT ? LT_COMPONENTS : 1); ++c)
@@ -142,8 +208,9 @@ vec3 ltLit(vec3 color, float opacity, int component, vec3 positionTC)
 #endif
 #if LT_LOOKS_UP
   vec3 positionVC = (g_ltTCToVC * vec4(beforeTC, 1.0)).xyz;
-#if LT_EXACT > 0 || LT_OCCLUSION == 1
-  vec4 exact = textureLod(in_ltExact, positionVC, 0.0);
+#if LT_EXACT_TEXTURES > 0
+  vec4 fields[LT_EXACT_TEXTURES];
+  ltFetchExact(positionVC, fields);
 #endif
 #if LT_HARMONICS > 0
   vec4 texels[LT_HARMONICS];
@@ -152,11 +219,10 @@ vec3 ltLit(vec3 color, float opacity, int component, vec3 positionTC)
 #endif
 
   float occlusion = 1.0;
-#if LT_OCCLUSION == 1
-  occlusion = exact.a;
-#elif LT_OCCLUSION == 2
-  // The mean over directions is v_00 Y_00.
-  occlusion = 0.28209479 * (texels[0].x * in_ltHarmonicsScale[0].x + in_ltHarmonicsShift[0].x);
+#if LT_MEAN == 1
+  occlusion = ltMeanOf(fields);
+#elif LT_MEAN == 2
+  occlusion = ltMeanOf(texels);
 #endif
   vec3 sum = in_ambient[component] * color * mix(1.0, occlusion, in_ltOcclusionStrength);
 
@@ -171,22 +237,23 @@ vec3 ltLit(vec3 color, float opacity, int component, vec3 positionTC)
     float intensity;
     float reach;
     vec3 l = ltTowards(i, positionWC, intensity, reach);
-    float v = 1.0;
+    ltVisible v = ltVisible(1.0);
 #if LT_SHADOW == 2
     v = ltTransmittance(beforeTC, l, reach);
 #elif LT_EXACT > 0 && LT_HARMONICS > 0 && LT_LIGHTS > LT_EXACT
-    v = i < LT_EXACT ? exact[min(i, LT_EXACT - 1)] : ltVisibilityOf(i - LT_EXACT, l, texels);
+    v = i < LT_EXACT ? ltExactOf(min(i, LT_EXACT - 1), fields)
+                     : ltVisible(ltVisibilityOf(i - LT_EXACT, l, texels));
 #elif LT_EXACT > 0
-    v = exact[min(i, LT_EXACT - 1)];
+    v = ltExactOf(min(i, LT_EXACT - 1), fields);
 #elif LT_HARMONICS > 0
-    v = ltVisibilityOf(i, l, texels);
+    v = ltVisible(ltVisibilityOf(i, l, texels));
 #endif
-    intensity *= mix(1.0, v, in_ltShadowStrength);
+    ltVisible arriving = intensity * mix(ltVisible(1.0), v, in_ltShadowStrength);
     vec3 diffuse;
     vec3 specular;
     ltReflect(n, l, g_ltViewWC, color, component, diffuse, specular);
     vec3 scattered = in_diffuse[component] * ltPhase(-dot(l, g_ltViewWC)) * color;
-    sum += intensity *
+    sum += arriving *
       (ltLightTexel(i, 1).rgb * mix(scattered, diffuse, surface) +
         ltLightTexel(i, 2).rgb * (surface * specular));
   }
@@ -198,9 +265,9 @@ vec3 ltLit(vec3 color, float opacity, int component, vec3 positionTC)
   vec4 lobe = vec4(0.28209479, 0.48860251 *
       (surface * 0.66666667 * (toData * n) -
         (1.0 - surface) * in_ltAnisotropy * (toData * g_ltViewWC)).yzx);
-  vec3 arriving = vec3(dot(lobe, ltArriving(0, texels)), dot(lobe, ltArriving(1, texels)),
+  vec3 around = vec3(dot(lobe, ltArriving(0, texels)), dot(lobe, ltArriving(1, texels)),
     dot(lobe, ltArriving(2, texels)));
-  sum += in_diffuse[component] * color * clamp(arriving, vec3(0.0), in_ltEnvironmentMost);
+  sum += in_diffuse[component] * color * clamp(around, vec3(0.0), in_ltEnvironmentMost);
 #endif
   return sum;
 }

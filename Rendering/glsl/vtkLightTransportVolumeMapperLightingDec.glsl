@@ -3,11 +3,10 @@
 // Class:   vtkLightTransportVolumeMapper    Part: lighting, declarations    Stage: fragment
 // Tag:     VTK::ComputeLighting::Dec, before it.
 // Needs:   LT_LIGHTS how many lights, LT_LIGHT_TEXTURE 1 if they are in a texture, LT_POSITIONAL
-//          1 if one of them has a place, LT_SHADOW (0 none, 1 precomputed, 2 ray traced), LT_EXACT
-//          how many lights have a field of their own, LT_HARMONICS how many textures of spherical
-//          harmonics there are, LT_OCCLUSION (0 none, 1 in the fields' alpha, 2 in the harmonics),
+//          1 if one of them has a place, LT_SHADOW (0 none, 1 precomputed, 2 ray traced),
 //          LT_ENVIRONMENT 1 if there is one, LT_PBR 1 for PhysicallyBased, LT_ISOTROPIC 1 if the
-//          phase function is; from VTK's declarations the uniforms of the volume's geometry.
+//          phase function is; vtkLightTransportVisibility.glsl before it; from VTK's declarations
+//          the uniforms of the volume's geometry.
 // Defines: pure functions of the shading and the look-ups of visibility. Positions are TC, the
 //          volume's texture coordinates, or VC, those of the visibility's grid; directions and
 //          normals are WC, the world's, or DC, those of the data (the harmonics').
@@ -32,36 +31,10 @@ uniform vec4 in_ltGradientThreshold; // of each component
 uniform float in_ltOcclusionStrength;
 uniform vec2 in_ltMaterial; // roughness, metallic
 
-#if LT_EXACT > 0 || LT_OCCLUSION == 1
-uniform sampler3D in_ltExact; // visibility of one light a channel
-#endif
-#if LT_HARMONICS > 0
-uniform sampler3D in_ltHarmonics0;
-#endif
-#if LT_HARMONICS > 1
-uniform sampler3D in_ltHarmonics1;
-#endif
-#if LT_HARMONICS > 2
-uniform sampler3D in_ltHarmonics2;
-#endif
-#if LT_HARMONICS > 3
-uniform sampler3D in_ltHarmonics3;
-#endif
-#if LT_HARMONICS > 4
-uniform sampler3D in_ltHarmonics4;
-#endif
-#if LT_HARMONICS > 5
-uniform sampler3D in_ltHarmonics5;
-#endif
-#if LT_HARMONICS > 6
-uniform sampler3D in_ltHarmonics6;
-#endif
 #if LT_HARMONICS > 0
 // Linear in the texels as stored: coefficients for each texture, then a constant in x. Of each
 // light without a field of its own; rows 0 to 2 of the environment are red, green and blue, of
 // each the four coefficients of the light that arrives, a column a stored value.
-uniform vec4 in_ltHarmonicsScale[LT_HARMONICS]; // texel -> windowed coefficient
-uniform vec4 in_ltHarmonicsShift[LT_HARMONICS];
 #if LT_LIGHTS > LT_EXACT && !LT_LIGHT_TEXTURE
 uniform vec4 in_ltLightHarmonics[(LT_LIGHTS - LT_EXACT) * (LT_HARMONICS + 1)];
 #endif
@@ -78,7 +51,7 @@ uniform vec4 in_ltEnvironment[3 * (LT_ENVIRONMENT_VALUES + 1)];
 uniform vec3 in_ltEnvironmentMost; // its brightest radiance
 #endif
 
-#if LT_EXACT > 0 || LT_OCCLUSION == 1 || LT_HARMONICS > 0
+#if LT_EXACT_TEXTURES > 0 || LT_HARMONICS > 0
 #define LT_LOOKS_UP 1
 uniform mat4 in_ltDatasetToVC;
 mat4 g_ltTCToVC;
@@ -190,57 +163,17 @@ vec3 ltTowards(int light, vec3 positionWC, out float intensity, out float reach)
 #endif
 
 #if LT_HARMONICS > 0
-// The stored texels at a place.
-void ltFetchHarmonics(vec3 positionVC, out vec4 texels[LT_HARMONICS])
-{
-  texels[0] = textureLod(in_ltHarmonics0, positionVC, 0.0);
-#if LT_HARMONICS > 1
-  texels[1] = textureLod(in_ltHarmonics1, positionVC, 0.0);
-#endif
-#if LT_HARMONICS > 2
-  texels[2] = textureLod(in_ltHarmonics2, positionVC, 0.0);
-#endif
-#if LT_HARMONICS > 3
-  texels[3] = textureLod(in_ltHarmonics3, positionVC, 0.0);
-#endif
-#if LT_HARMONICS > 4
-  texels[4] = textureLod(in_ltHarmonics4, positionVC, 0.0);
-#endif
-#if LT_HARMONICS > 5
-  texels[5] = textureLod(in_ltHarmonics5, positionVC, 0.0);
-#endif
-#if LT_HARMONICS > 6
-  texels[6] = textureLod(in_ltHarmonics6, positionVC, 0.0);
-#endif
-}
-
-// Visibility in a direction of the data, bands 0 to 2, windowed.
-float ltVisibilityTowards(vec3 d, vec4 texels[LT_HARMONICS])
-{
-  vec4 first = texels[0] * in_ltHarmonicsScale[0] + in_ltHarmonicsShift[0];
-  float v = dot(first, vec4(0.28209479, 0.48860251 * d.yzx));
-#if LT_HARMONICS > 2
-  vec4 second = texels[1] * in_ltHarmonicsScale[1] + in_ltHarmonicsShift[1];
-  float last = texels[2].x * in_ltHarmonicsScale[2].x + in_ltHarmonicsShift[2].x;
-  v += dot(second,
-    vec4(1.09254843 * d.x * d.y, 1.09254843 * d.y * d.z, 0.31539157 * (3.0 * d.z * d.z - 1.0),
-      1.09254843 * d.x * d.z));
-  v += last * 0.54627422 * (d.x * d.x - d.y * d.y);
-#endif
-  return clamp(v, 0.0, 1.0);
-}
-
 #if LT_LIGHTS > LT_EXACT
 // Visibility of a light without a field of its own, 0 the first of them.
 float ltVisibilityOf(int light, vec3 l, vec4 texels[LT_HARMONICS])
 {
 #if LT_LIGHT_TEXTURE
-  return ltVisibilityTowards(mat3(in_ltWorldToData) * l, texels);
+  return ltVisibilityTowards(normalize(mat3(in_ltWorldToData) * l), texels);
 #else
 #if LT_POSITIONAL
   if (in_ltLights[5 * (light + LT_EXACT)].w != 0.0)
   {
-    return ltVisibilityTowards(mat3(in_ltWorldToData) * l, texels);
+    return ltVisibilityTowards(normalize(mat3(in_ltWorldToData) * l), texels);
   }
 #endif
   float v = in_ltLightHarmonics[light * (LT_HARMONICS + 1) + LT_HARMONICS].x;

@@ -362,6 +362,28 @@ void kept(Suite& suite)
   LT_CHECK(suite,
     filter->GetExtinctionSeconds() == 0. && filter->GetHarmonicsSeconds() == 0. &&
       filter->GetLightsSeconds() == 0.);
+  // An array per light: the same values; that of a light that stays is the same object.
+  vtkSmartPointer<vtkDataArray> together = pointArray(filter, "Visibility");
+  filter->SeparateLightsOn();
+  filter->Update();
+  LT_CHECK(suite, !pointArray(filter, "Visibility") && filter->GetLightsSeconds() == 0.);
+  vtkSmartPointer<vtkDataArray> apart[3];
+  for (int l = 0; l < 3; ++l)
+  {
+    apart[l] = pointArray(filter, ("Visibility" + std::to_string(l)).c_str());
+    bool same = apart[l] && apart[l]->GetNumberOfComponents() == 1;
+    for (vtkIdType i = 0; same && i < together->GetNumberOfTuples(); ++i)
+    {
+      same = apart[l]->GetComponent(i, 0) == together->GetComponent(i, l);
+    }
+    LT_CHECK(suite, same);
+  }
+  filter->SetLightPosition(1, -3., 4., 6.);
+  filter->Update();
+  LT_CHECK(suite, pointArray(filter, "Visibility0") == apart[0]);
+  LT_CHECK(suite, pointArray(filter, "Visibility1") != apart[1]);
+  LT_CHECK(suite, pointArray(filter, "Visibility2") == apart[2]);
+  filter->SeparateLightsOff();
   // Without lights there is no array of theirs.
   filter->RemoveAllLights();
   filter->Update();

@@ -45,11 +45,12 @@ struct Ball
     return -x * mu + std::sqrt(std::max(Radius * Radius - x * x * (1. - mu * mu), 0.));
   }
   /** Radiance of the middle pixel, light from the direction with cosine mu to the eye's. */
-  double scattered(double mu) const
+  double scattered(double mu, double share = 1.) const
   {
-    // The eye is at +x; s is the way into the ball.
+    // The eye is at +x; s is the way into the ball. Light in a colour has its share of sigma.
     return integrate(2. * Radius,
-      [&](double s) { return this->sigma * std::exp(-this->sigma * (s + path(Radius - s, mu))); });
+      [&](double s)
+      { return this->sigma * std::exp(-this->sigma * (s + share * path(Radius - s, mu))); });
   }
   double underEvenSky() const
   {
@@ -203,6 +204,53 @@ void closedForms(Suite& suite)
   }
 }
 
+/** Light takes the transport colour of the ball: each channel's closed form. */
+void colors(Suite& suite)
+{
+  auto image = makeBall(1.);
+  BallScene scene(image);
+  scene.color->RemoveAllPoints();
+  const double rgb[3] = { .9, .5, .2 };
+  scene.color->AddRGBPoint(0., rgb[0], rgb[1], rgb[2]);
+  scene.look({ 1., 0., 0. }, true);
+  scene.setDepth(.08, 1.);
+  scene.setSun(0., 30.);
+  auto observer = observe(scene.mapper);
+  scene.lighting->SetColoredShadows(true);
+  const double sum = 3. * 1.1 - rgb[0] - rgb[1] - rgb[2];
+  for (const int mode :
+    { vtkVolumeLightingProperty::Precomputed, vtkVolumeLightingProperty::RayTraced })
+  {
+    scene.lighting->SetShadowMode(mode);
+    const Color mean = regionMean(scene.capture(), 31, 31, 33, 33);
+    for (int c = 0; c < 3; ++c)
+    {
+      const double share = 3. * (1.1 - rgb[c]) / sum;
+      const double expected = rgb[c] * Ball{ .08 }.scattered(0., share);
+      std::cout << "colour " << c << ", mode " << mode << ": " << mean[c] / 255.
+                << ", closed form " << expected << "\n";
+      LT_CHECK_NEAR(suite, mean[c] / 255., expected, .07 * expected + .005);
+    }
+    // The fifth of five has no field in colours, and grey shadows.
+    for (int i = 0; i < 4; ++i)
+    {
+      vtkNew<vtkLight> more;
+      more->SetLightTypeToSceneLight();
+      more->SetPosition(scene.sun->GetPosition());
+      more->SetFocalPoint(0., 0., 0.);
+      more->SetIntensity(.2);
+      scene.renderer->AddLight(more);
+    }
+    scene.sun->SetIntensity(.2);
+    const Color five = regionMean(scene.capture(), 31, 31, 33, 33);
+    LT_CHECK_NEAR(suite, five[0], mean[0], .15 * mean[0]);
+    scene.sun->SetIntensity(1.);
+    scene.renderer->RemoveAllLights();
+    scene.renderer->AddLight(scene.sun);
+  }
+  LT_CHECK(suite, observer->all().empty());
+}
+
 /** Albedo 1, opaque or not, surface or medium, shadows or none: not brighter than the sky. */
 void energy(Suite& suite)
 {
@@ -276,6 +324,7 @@ int main(int argc, char* argv[])
   }
   KeepDisplay keep;
   closedForms(suite);
+  colors(suite);
   energy(suite);
   rotation(suite);
   LT_CHECK(suite, openGLErrors().empty());

@@ -32,7 +32,7 @@ int main(int argc, char* argv[])
   LT_CHECK(suite, p->GetStrength() == 1. && p->GetShadowStrength() == 0.);
   LT_CHECK(suite, p->GetRoughness() == 1. && p->GetMetallic() == 0. && p->GetAnisotropy() == .95);
   LT_CHECK(suite, p->GetAmbientOcclusion() == 1. && p->GetSurfaceOffset() == 10.);
-  LT_CHECK(suite, p->GetNumberOfExactLights() == 4 && p->GetVisibilityOrder() == 4);
+  LT_CHECK(suite, p->GetNumberOfExactLights() == 8 && p->GetVisibilityOrder() == 4);
   LT_CHECK(suite, p->GetVisibilityResolution() == 8);
   LT_CHECK(suite, observer->errors.empty());
 

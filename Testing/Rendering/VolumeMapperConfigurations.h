@@ -234,6 +234,16 @@ inline std::vector<Configuration> configurations()
       [](M* m, P*, R*) { m->SetImageSampleDistance(2.F); } },
     { "composite two independent components", composite, 2, true,
       [](M*, P* p, R*) { otherComponents(p, 2); } },
+    { "composite two independent components gradient opacity", composite, 2, true,
+      [](M*, P* p, R*)
+      {
+        otherComponents(p, 2);
+        gradientOpacity(p);
+        vtkNew<vtkPiecewiseFunction> other;
+        other->AddPoint(0., .9);
+        other->AddPoint(12., .1);
+        p->SetGradientOpacity(1, other);
+      } },
     { "composite four independent components shaded", composite, 4, true,
       [](M*, P* p, R*)
       {
