@@ -131,6 +131,11 @@ struct ColorTable
   }
 };
 
+double extinctionOf(double alpha, double unitDistance)
+{
+  return alpha > 0. ? -std::log1p(-std::min(alpha, MostOpaque)) / unitDistance : 0.;
+}
+
 /** What the volume's property makes of values: opacity per unit distance. */
 struct Classifier
 {
@@ -146,6 +151,7 @@ struct Classifier
   bool byGradient[4] = { false, false, false, false };
   Table gradientOpacity[4];
   vtkImageData* transfer2D[4] = { nullptr, nullptr, nullptr, nullptr };
+  Table sigma; // of one component without gradients and labels, in opacity's place
   bool colored = false;
   ColorTable color[4];
   std::vector<std::array<double, 2>> isosurfaces; // value, optical depth across
@@ -282,6 +288,14 @@ Classifier makeClassifier(vtkGPUVolumeRayCastMapper* mapper, vtkVolumeProperty* 
     }
   }
   prepareMask(mapper, property, scalars, classifier);
+  if (classifier.components == 1 && !classifier.byGradient[0] && !classifier.labels)
+  {
+    classifier.sigma = classifier.opacity[0];
+    for (double& entry : classifier.sigma.entries)
+    {
+      entry = extinctionOf(entry, classifier.unitDistance[0]);
+    }
+  }
   if (mapper->GetBlendMode() == vtkVolumeMapper::ISOSURFACE_BLEND)
   {
     vtkContourValues* contours = property->GetIsoSurfaceValues();
@@ -365,7 +379,14 @@ Cuts makeCuts(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volume, vtkImageData
 }
 
 //------------------------------------------------------------------------------
-/** sigma_t of every value, averaged over blocks of step^3. */
+/** A value, or a quarter of the way to its neighbours: side -1, 0, 1. */
+struct Place
+{
+  int index[3];
+  int side[3];
+};
+
+/** sigma_t of what is drawn, averaged over blocks of values. */
 template <typename T>
 struct Worker
 {
@@ -373,22 +394,23 @@ struct Worker
   const Scalars& scalars;
   const Classifier& classifier;
   const Cuts& cuts;
-  int step;
+  bool interpolates;
+  int steps[3];
   int coarse[3];
   float* sigma_t;    // one value, or three
   double axes[3][3]; // world vector from a value to the next, along each grid axis
 
   /** |grad S| times the mean spacing, as VTK's gradient opacity has it. */
-  double gradient(int i, int j, int k, int c) const
+  double gradient(const Place& p, int c) const
   {
     const int* n = this->scalars.dimensions;
-    const int index[3] = { i, j, k };
+    const int(&index)[3] = p.index;
     double sum = 0.;
     double spacings = 0.;
     for (int a = 0; a < 3; ++a)
     {
-      int lower[3] = { i, j, k };
-      int upper[3] = { i, j, k };
+      int lower[3] = { index[0], index[1], index[2] };
+      int upper[3] = { index[0], index[1], index[2] };
       lower[a] = std::max(index[a] - 1, 0);
       upper[a] = std::min(index[a] + 1, n[a] - 1);
       const double length = std::hypot(this->axes[a][0], this->axes[a][1], this->axes[a][2]);
@@ -407,16 +429,35 @@ struct Worker
     return static_cast<double>(this->values[p * this->scalars.array->GetNumberOfComponents() + c]);
   }
 
-  static double extinction(double alpha, double unitDistance)
+  /** Interpolated, as it is drawn. */
+  double valueAt(const Place& p, int c) const
   {
-    return alpha > 0. ? -std::log1p(-std::min(alpha, MostOpaque)) / unitDistance : 0.;
+    double sum = 0.;
+    for (int corner = 0; corner < 8; ++corner)
+    {
+      double weight = 1.;
+      int index[3];
+      for (int a = 0; a < 3; ++a)
+      {
+        const bool aside = (corner >> a & 1) != 0;
+        weight *= p.side[a] == 0 ? (aside ? 0. : 1.) : aside ? .25 : .75;
+        index[a] = aside
+          ? std::min(std::max(p.index[a] + p.side[a], 0), this->scalars.dimensions[a] - 1)
+          : p.index[a];
+      }
+      if (weight > 0.)
+      {
+        sum += weight * this->at(index[0], index[1], index[2], c);
+      }
+    }
+    return sum;
   }
 
   /** Opacity of a component's value over its unit distance. */
-  double opacity(int i, int j, int k, int component, int function) const
+  double opacity(const Place& p, int component, int function) const
   {
     const Classifier& f = this->classifier;
-    double value = this->at(i, j, k, component);
+    double value = this->valueAt(p, component);
     if (std::isnan(value))
     {
       return 0.;
@@ -428,13 +469,13 @@ struct Worker
     }
     // Dependent components have their gradient from the first.
     return f.opacityOf(function, value,
-      f.byGradient[function] ? this->gradient(i, j, k, f.independent ? component : 0) : 0.);
+      f.byGradient[function] ? this->gradient(p, f.independent ? component : 0) : 0.);
   }
 
   /** An isosurface's depth over the length on which it passes between neighbours. */
-  double surfaces(int i, int j, int k) const
+  double surfaces(const Place& p) const
   {
-    const double here = this->at(i, j, k, 0);
+    const double here = this->at(p.index[0], p.index[1], p.index[2], 0);
     double sigma = 0.;
     for (const auto& isosurface : this->classifier.isosurfaces)
     {
@@ -444,7 +485,7 @@ struct Worker
         double crossings = 0.;
         for (const int side : { -1, 1 })
         {
-          int at[3] = { i, j, k };
+          int at[3] = { p.index[0], p.index[1], p.index[2] };
           at[a] += side;
           if (at[a] < 0 || at[a] >= this->scalars.dimensions[a])
           {
@@ -465,12 +506,21 @@ struct Worker
     return sigma;
   }
 
-  double sigma(int i, int j, int k) const
+  double sigma(const Place& p) const
   {
     const Classifier& f = this->classifier;
+    if (!f.labels && this->label(p) <= 0.)
+    {
+      return 0.;
+    }
     if (!f.isosurfaces.empty())
     {
-      return this->surfaces(i, j, k);
+      return this->surfaces(p);
+    }
+    if (!f.sigma.entries.empty())
+    {
+      const double value = this->valueAt(p, 0);
+      return std::isnan(value) ? 0. : f.sigma(value);
     }
     if (f.independent)
     {
@@ -479,32 +529,24 @@ struct Worker
       double squares = 0.;
       for (int c = 0; c < f.components; ++c)
       {
-        const double s = extinction(this->opacity(i, j, k, c, c), f.unitDistance[c]);
+        const double s = extinctionOf(this->opacity(p, c, c), f.unitDistance[c]);
         total += s * f.weights[c];
         squares += f.weights[c] > 0. ? s * s : 0.;
       }
-      const double s = total > 0. ? squares / total : 0.;
-      return this->label(i, j, k) > 0. || f.labels ? s : 0.;
+      return total > 0. ? squares / total : 0.;
     }
-    double alpha = this->opacity(i, j, k, f.opacityComponent, 0);
-    if (f.mask)
+    double alpha = this->opacity(p, f.opacityComponent, 0);
+    if (f.labels)
     {
-      const double label = this->label(i, j, k);
-      const auto own = f.labelOpacity.find(static_cast<int>(label));
-      if (!f.labels && label <= 0.)
-      {
-        alpha = 0.;
-      }
-      else if (f.labels && own != f.labelOpacity.end())
-      {
-        alpha += f.blend * (own->second(this->at(i, j, k, 0)) - alpha);
-      }
+      const auto own = f.labelOpacity.find(static_cast<int>(this->label(p)));
+      alpha +=
+        own != f.labelOpacity.end() ? f.blend * (own->second(this->valueAt(p, 0)) - alpha) : 0.;
     }
-    return extinction(alpha, f.unitDistance[0]);
+    return extinctionOf(alpha, f.unitDistance[0]);
   }
 
   /** Of red, green and blue. */
-  void shares(int i, int j, int k, double result[3]) const
+  void shares(const Place& p, double result[3]) const
   {
     const Classifier& f = this->classifier;
     double rgb[3] = { 0., 0., 0. };
@@ -512,25 +554,25 @@ struct Worker
     for (int c = 0; c < (f.independent ? f.components : 1); ++c)
     {
       // As VTK mixes them, by opacity and weight.
-      const double weight = f.independent ? f.weights[c] * this->opacity(i, j, k, c, c) : 1.;
-      const double value = this->at(i, j, k, c);
+      const double weight = f.independent ? f.weights[c] * this->opacity(p, c, c) : 1.;
+      const double value = this->valueAt(p, c);
       for (int channel = 0; channel < 3; ++channel)
       {
         const double own = f.components == 4 && !f.independent
-          ? this->at(i, j, k, channel) * (f.ofRange > 0. ? f.ofRange : 1.)
+          ? this->valueAt(p, channel) * (f.ofRange > 0. ? f.ofRange : 1.)
           : f.transfer2D[c]
-          ? static_cast<double>(f.lookUp2D(c, value, this->gradient(i, j, k, c))[channel])
+          ? static_cast<double>(f.lookUp2D(c, value, this->gradient(p, c))[channel])
           : f.color[c](value)[channel];
         rgb[channel] += weight * own;
       }
       total += weight;
     }
     const auto label =
-      f.labels ? f.labelColor.find(static_cast<int>(this->label(i, j, k))) : f.labelColor.end();
+      f.labels ? f.labelColor.find(static_cast<int>(this->label(p))) : f.labelColor.end();
     if (label != f.labelColor.end())
     {
       double own[3];
-      label->second->GetColor(this->at(i, j, k, 0), own);
+      label->second->GetColor(this->valueAt(p, 0), own);
       for (int channel = 0; channel < 3; ++channel)
       {
         rgb[channel] += f.blend * (total * own[channel] - rgb[channel]);
@@ -543,56 +585,88 @@ struct Worker
     vtkVisibilityFactorFilter::GetTransportColor(rgb, result);
   }
 
-  double label(int i, int j, int k) const
+  double label(const Place& p) const
   {
     const int* n = this->scalars.dimensions;
     return this->classifier.mask
-      ? this->classifier.mask->GetComponent((static_cast<vtkIdType>(k) * n[1] + j) * n[0] + i, 0)
+      ? this->classifier.mask->GetComponent(
+          (static_cast<vtkIdType>(p.index[2]) * n[1] + p.index[1]) * n[0] + p.index[0], 0)
       : 1.;
   }
 
-  /** The first value of a block; blocks of the margin are empty. */
-  int begin(int block) const { return std::max(block - 1, 0) * this->step; }
+  /** Adds what is at a place. */
+  void add(const Place& p, double sum[3]) const
+  {
+    if (this->cuts.any())
+    {
+      double index[3];
+      for (int a = 0; a < 3; ++a)
+      {
+        index[a] = p.index[a] + .25 * p.side[a] + this->scalars.first[a];
+      }
+      if (!this->cuts.keeps(index))
+      {
+        return;
+      }
+    }
+    const double s = this->sigma(p);
+    if (s > 0. && this->classifier.colored)
+    {
+      double share[3];
+      this->shares(p, share);
+      for (int c = 0; c < 3; ++c)
+      {
+        sum[c] += s * share[c];
+      }
+    }
+    else
+    {
+      sum[0] += s;
+    }
+  }
 
   void operator()(vtkIdType begin, vtkIdType end) const
   {
     const int* n = this->scalars.dimensions;
-    const double perBlock = 1. / (static_cast<double>(this->step) * this->step * this->step);
+    const int channels = this->classifier.colored ? 3 : 1;
+    // Two places along an axis, of two values or between the neighbours of one.
+    int places[3];
+    double perBlock = 1.;
+    for (int a = 0; a < 3; ++a)
+    {
+      places[a] = this->steps[a] == 1 && n[a] > 1 && this->interpolates ? 2 : this->steps[a];
+      perBlock /= places[a];
+    }
     for (vtkIdType row = begin; row < end; ++row)
     {
-      const int cj = static_cast<int>(row % this->coarse[1]);
-      const int ck = static_cast<int>(row / this->coarse[1]);
+      const int block[3] = { 0, static_cast<int>(row % this->coarse[1]),
+        static_cast<int>(row / this->coarse[1]) };
       for (int ci = 0; ci < this->coarse[0]; ++ci)
       {
         double sum[3] = { 0., 0., 0. };
-        const int channels = this->classifier.colored ? 3 : 1;
-        // The first block of each axis is the margin's, before the volume.
-        for (int k = this->begin(ck); k < std::min(ck * this->step, n[2]); ++k)
+        const vtkIdType places3 = static_cast<vtkIdType>(places[0]) * places[1] * places[2];
+        for (vtkIdType place = 0; place < places3; ++place)
         {
-          for (int j = this->begin(cj); j < std::min(cj * this->step, n[1]); ++j)
+          const int offset[3] = { static_cast<int>(place % places[0]),
+            static_cast<int>(place / places[0] % places[1]),
+            static_cast<int>(place / places[0] / places[1]) };
+          Place p;
+          bool inside = true;
+          for (int a = 0; a < 3; ++a)
           {
-            for (int i = this->begin(ci); i < std::min(ci * this->step, n[0]); ++i)
-            {
-              const double index[3] = { i + this->scalars.first[0], j + this->scalars.first[1],
-                k + this->scalars.first[2] };
-              if (this->cuts.any() && !this->cuts.keeps(index))
-              {
-                continue;
-              }
-              double share[3] = { 1., 1., 1. };
-              const double s = this->sigma(i, j, k);
-              if (channels == 3 && s > 0.)
-              {
-                this->shares(i, j, k, share);
-              }
-              for (int c = 0; c < channels; ++c)
-              {
-                sum[c] += s * share[c];
-              }
-            }
+            const bool between = this->steps[a] == 1 && places[a] == 2;
+            // The first block of each axis is the margin's, before the volume; the last ones may
+            // reach beyond it. There is nothing.
+            const int first = ((a == 0 ? ci : block[a]) - 1) * this->steps[a];
+            p.index[a] = first + (between ? 0 : offset[a]);
+            p.side[a] = between ? 2 * offset[a] - 1 : 0;
+            inside = inside && p.index[a] >= 0 && p.index[a] < n[a];
+          }
+          if (inside)
+          {
+            this->add(p, sum);
           }
         }
-        // The last block of a row may reach beyond the volume, where there is nothing.
         for (int c = 0; c < channels; ++c)
         {
           this->sigma_t[(row * this->coarse[0] + ci) * channels + c] =
@@ -605,14 +679,35 @@ struct Worker
 
 template <typename T>
 void compute(const T* values, const Scalars& scalars, const Classifier& classifier,
-  const Cuts& cuts, int step, const int coarse[3], const double axes[3][3], float* sigma_t)
+  const Cuts& cuts, bool interpolates, const int steps[3], const int coarse[3],
+  const double axes[3][3], float* sigma_t)
 {
-  Worker<T> worker{ values, scalars, classifier, cuts, step, { coarse[0], coarse[1], coarse[2] },
-    sigma_t, {} };
+  Worker<T> worker{ values, scalars, classifier, cuts, interpolates,
+    { steps[0], steps[1], steps[2] }, { coarse[0], coarse[1], coarse[2] }, sigma_t, {} };
   std::copy(&axes[0][0], &axes[0][0] + 9, &worker.axes[0][0]);
   vtkSMPTools::For(0, static_cast<vtkIdType>(coarse[1]) * coarse[2], worker);
 }
 } // namespace
+
+//------------------------------------------------------------------------------
+void VolumeExtinctionSteps(const int n[3], const double spacing[3], int resolution, int steps[3])
+{
+  std::fill(steps, steps + 3, 1);
+  const double most = 1.25 * resolution * resolution * resolution;
+  const auto blocks = [&](int a) { return (n[a] + steps[a] - 1) / steps[a]; };
+  while (1. * blocks(0) * blocks(1) * blocks(2) > most)
+  {
+    // The closest next.
+    int axis = -1;
+    for (int a = 0; a < 3; ++a)
+    {
+      const bool closer = axis < 0 ||
+        std::abs(spacing[a]) * steps[a] < std::abs(spacing[axis]) * steps[axis] * (1. - 1e-9);
+      axis = blocks(a) > 1 && closer ? a : axis;
+    }
+    ++steps[axis];
+  }
+}
 
 //------------------------------------------------------------------------------
 std::vector<double> VolumeExtinctionKey(
@@ -643,6 +738,7 @@ std::vector<double> VolumeExtinctionKey(
   }
   key.push_back(property->GetIndependentComponents());
   key.push_back(property->GetTransferFunctionMode());
+  key.push_back(property->GetInterpolationType() != VTK_NEAREST_INTERPOLATION);
   const int components = std::min(scalars.array->GetNumberOfComponents(), 4);
   for (int c = 0; c < components; ++c)
   {
@@ -716,8 +812,8 @@ std::string VolumeExtinction(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volum
   const Cuts cuts = makeCuts(mapper, volume, scalars.image);
 
   const int* n = scalars.dimensions;
-  const int longest = *std::max_element(n, n + 3);
-  const int step = std::max(1, (longest + resolution - 1) / resolution);
+  int steps[3];
+  VolumeExtinctionSteps(n, scalars.image->GetSpacing(), resolution, steps);
   int coarse[3];
   double origin[3];
   double spacing[3];
@@ -725,12 +821,13 @@ std::string VolumeExtinction(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volum
   vtkMatrix4x4* indexToData = scalars.image->GetIndexToPhysicalMatrix();
   for (int a = 0; a < 3; ++a)
   {
-    coarse[a] = (n[a] + step - 1) / step + 2;
-    spacing[a] = scalars.image->GetSpacing()[a] * step;
+    coarse[a] = (n[a] + steps[a] - 1) / steps[a] + 2;
+    spacing[a] = scalars.image->GetSpacing()[a] * steps[a];
     origin[a] = indexToData->GetElement(a, 3);
     for (int b = 0; b < 3; ++b)
     {
-      origin[a] += indexToData->GetElement(a, b) * (scalars.first[b] + .5 * (step - 1) - step);
+      origin[a] +=
+        indexToData->GetElement(a, b) * (scalars.first[b] + .5 * (steps[b] - 1) - steps[b]);
       axes[b][a] = indexToData->GetElement(a, b);
     }
   }
@@ -742,7 +839,8 @@ std::string VolumeExtinction(vtkGPUVolumeRayCastMapper* mapper, vtkVolume* volum
   switch (scalars.array->GetDataType())
   {
     vtkTemplateMacro(compute(static_cast<const VTK_TT*>(scalars.array->GetVoidPointer(0)), scalars,
-      classifier, cuts, step, coarse, axes, sigma_t->GetPointer(0)));
+      classifier, cuts, property->GetInterpolationType() != VTK_NEAREST_INTERPOLATION, steps,
+      coarse, axes, sigma_t->GetPointer(0)));
     default:
       return "the volume's scalars are no numbers";
   }

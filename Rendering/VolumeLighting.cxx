@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "VolumeLighting.h"
 
+#include "VolumeExtinction.h"
 #include "vtkLightTransportCompat.h"
 #include "vtkVisibilityFactorFilter.h"
 
@@ -526,14 +527,16 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     vtkImageData* image = vtkImageData::SafeDownCast(mapper->GetDataSetInput());
     int n[3];
     image->GetDimensions(n);
-    const double* spacing = image->GetSpacing();
-    const int longest = *std::max_element(n, n + 3);
-    const int resolution = property->GetVisibilityResolution();
-    const int step = std::max(1, (longest + resolution - 1) / resolution);
-    const double length = property->GetSurfaceOffset() * step *
-      std::cbrt(std::abs(spacing[0] * spacing[1] * spacing[2]));
-    this->SurfaceOffset[0] = static_cast<float>(length * scale);
-    this->SurfaceOffset[1] = static_cast<float>(length);
+    int steps[3];
+    VolumeExtinctionSteps(n, image->GetSpacing(), property->GetVisibilityResolution(), steps);
+    vtkNew<vtkMatrix4x4> worldToIndex;
+    vtkMatrix4x4::Invert(volume->GetMatrix(), worldToIndex);
+    vtkMatrix4x4::Multiply4x4(image->GetPhysicalToIndexMatrix(), worldToIndex, this->WorldToSteps);
+    for (int i = 0; i < 9; ++i)
+    {
+      this->WorldToSteps->SetElement(
+        i / 3, i % 3, this->WorldToSteps->GetElement(i / 3, i % 3) / steps[i / 3]);
+    }
   }
   const double given = property->GetGradientThreshold();
   for (int c = 0; c < 4; ++c)
@@ -637,10 +640,7 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
 
   set("in_ltLightingStrength", property->GetStrength());
   set("in_ltShadowStrength", property->GetShadowStrength());
-  if (program->IsUniformUsed("in_ltSurfaceOffset"))
-  {
-    program->SetUniform2f("in_ltSurfaceOffset", this->SurfaceOffset);
-  }
+  set("in_ltSurfaceOffset", property->GetSurfaceOffset());
   set("in_ltAnisotropy", property->GetAnisotropy());
   set("in_ltOcclusionStrength", property->GetAmbientOcclusion());
   if (program->IsUniformUsed("in_ltMaterial"))
@@ -656,6 +656,7 @@ void VolumeLighting::SetUniforms(vtkShaderProgram* program)
   this->Visibility.SetUniforms(program);
   matrix("in_ltDatasetToVC", this->Visibility.GetDataToGrid());
   matrix("in_ltWorldToData", this->WorldToData);
+  matrix("in_ltWorldToSteps", this->WorldToSteps);
 
   if (this->LightsInTexture)
   {

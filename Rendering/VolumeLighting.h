@@ -94,7 +94,7 @@ private:
   // the frame's
   std::string DefinesOfFrame;
   vtkNew<vtkMatrix4x4> WorldToData;
-  float SurfaceOffset[2] = { 0.F, 0.F }; // world, data
+  vtkNew<vtkMatrix4x4> WorldToSteps; // of the visibility's grid
   float Thresholds[4] = { 1.F, 1.F, 1.F, 1.F };
   std::vector<Radiance> Environment;
   vtkTexture* EnvironmentSource = nullptr; // compared, never used

@@ -89,7 +89,7 @@ private:
   /** What a channel of a texture holds: (x - shift) / scale of the mean of some components. */
   struct Channel
   {
-    vtkSmartPointer<vtkDataArray> array;
+    vtkDataArray* array = nullptr; // beyond a frame compared, never used: times differ always
     vtkMTimeType time = 0;
     int component = 0;
     int count = 1;

@@ -1161,7 +1161,8 @@ int DefaultNumberOfDirections(int order)
 
 //------------------------------------------------------------------------------
 bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 3>& direction,
-  float* v, std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress)
+  float* v, std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress,
+  VisibilityScratch* scratch)
 {
   // Of any length: its square may be more than a number can hold.
   std::array<double, 3> w = direction;
@@ -1176,15 +1177,17 @@ bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 
   }
   // One direction, whose "coefficient" is v itself.
   const int sweep = SweepAxis(medium.grid, w);
-  Buffer<float> transposed(sweep == 0 ? medium.grid.size() : 0);
-  if (sweep == 0)
+  VisibilityScratch own;
+  VisibilityScratch& kept = scratch ? *scratch : own;
+  if (sweep == 0 && kept.transposed.empty())
   {
-    Transpose(medium.grid.dims, medium.sigma_t, 1, transposed.data(), 1, parallel);
+    kept.across.allocate(medium.grid.size());
+    kept.transposed.allocate(medium.grid.size());
+    Transpose(medium.grid.dims, medium.sigma_t, 1, kept.transposed.data(), 1, parallel);
   }
-  View view = MakeView(medium, sweep, transposed.data());
+  View view = MakeView(medium, sweep, kept.transposed.data());
   // Along x the result, too, is transposed first: writing it across would take longer.
   const std::array<int, 3>& n = view.n;
-  Buffer<float> across(sweep == 0 ? medium.grid.size() : 0);
   if (sweep == 0)
   {
     view.out = { { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] } };
@@ -1194,14 +1197,14 @@ bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 
   Y[0][0] = 1.f;
   Batch batch(view, shears, Y, medium.radius);
   std::int64_t done = 0;
-  if (!Sweep(view, batch, 1, 0, false, sweep == 0 ? across.data() : v, sweep == 0 ? 1 : stride,
+  if (!Sweep(view, batch, 1, 0, false, sweep == 0 ? kept.across.data() : v, sweep == 0 ? 1 : stride,
         parallel, progress, done, n[2]))
   {
     return false;
   }
   if (sweep == 0)
   {
-    Transpose(n, across.data(), 1, v, stride, parallel);
+    Transpose(n, kept.across.data(), 1, v, stride, parallel);
   }
   return true;
 }

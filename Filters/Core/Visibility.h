@@ -3,6 +3,7 @@
 #ifndef LightTransport_Core_Visibility_h
 #define LightTransport_Core_Visibility_h
 
+#include "Core/Buffer.h"
 #include "Core/Grid.h"
 #include "Core/Parallel.h"
 
@@ -84,12 +85,21 @@ DirectionSet MakeDirections(int n, int degree);
 /** The number of directions with which an order is computed by default. */
 int DefaultNumberOfDirections(int order);
 
+/** What sweeps along x need, kept from one to the next through the same medium: saves half of them.
+ */
+struct VisibilityScratch
+{
+  Buffer<float> transposed; // of sigma_t
+  Buffer<float> across;     // of v
+};
+
 /**
  * v of every voxel towards a light in the direction w (grid axes, any length > 0),
  * written every `stride` floats. False if `progress` (may be empty) asked to stop.
  */
 bool VisibilityTowards(const VisibilityMedium& medium, const std::array<double, 3>& w, float* v,
-  std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress);
+  std::int64_t stride, const ParallelFor& parallel, const ProgressFunction& progress,
+  VisibilityScratch* scratch = nullptr);
 
 /**
  * v of every voxel towards a light at a place (lengths along the grid's axes from

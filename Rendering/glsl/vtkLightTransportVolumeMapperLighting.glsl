@@ -202,9 +202,9 @@ vec3 ltLit(vec3 color, float opacity, int component, vec3 positionTC)
   // A surface is not shadowed by itself: what reaches it is looked up a little before it. Nor is
   // what is opaque within that length, such as a cut through dense matter.
 #if LT_LOOKS_UP || LT_SHADOW == 2
-  float depth = -log(max(1.0 - opacity, 1e-6)) * in_ltSurfaceOffset.y / in_sampleDistance;
-  vec3 before = mix(smoothstep(1.0, 4.0, depth) * g_ltViewWC, n, surface);
-  vec3 beforeTC = positionTC + g_ltWCToTC * (in_ltSurfaceOffset.x * before);
+  float depth = -log(max(1.0 - opacity, 1e-6)) * g_ltSamplesTowardsEye;
+  vec3 before = mix(smoothstep(1.0, 4.0, depth) * g_ltTowardsEye, ltOffset(n), surface);
+  vec3 beforeTC = positionTC + g_ltWCToTC * before;
 #endif
 #if LT_LOOKS_UP
   vec3 positionVC = (g_ltTCToVC * vec4(beforeTC, 1.0)).xyz;

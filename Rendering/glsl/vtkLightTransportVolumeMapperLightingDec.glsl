@@ -65,8 +65,18 @@ vec3 g_ltViewWC;               // to the eye; the same all along a ray
 #if LT_POSITIONAL
 mat4 g_ltTCToWC;
 #endif
-uniform vec2 in_ltSurfaceOffset; // length in the world, and in the data's coordinates
+uniform float in_ltSurfaceOffset; // steps of the visibility's grid
+uniform mat4 in_ltWorldToSteps;   // of directions
 mat3 g_ltWCToTC;                  // of directions
+vec3 g_ltTowardsEye;              // the surface offset along the view
+float g_ltSamplesTowardsEye;      // sample distances in it
+
+// That many steps along a direction of length 1.
+vec3 ltOffset(vec3 direction)
+{
+  return direction *
+    (in_ltSurfaceOffset / max(length(mat3(in_ltWorldToSteps) * direction), 1e-30));
+}
 
 // Affine maps, once per ray. TCToData is TC -> data coordinates.
 void ltInitLighting(mat4 TCToData)
@@ -88,6 +98,9 @@ void ltInitLighting(mat4 TCToData)
   g_ltTCToWC = TCToWC;
 #endif
   g_ltWCToTC = inverse(linear);
+  g_ltTowardsEye = ltOffset(g_ltViewWC);
+  g_ltSamplesTowardsEye =
+    length(mat3(in_inverseVolumeMatrix[0]) * g_ltTowardsEye) / in_sampleDistance;
 }
 
 // 4 pi times the phase function; theta is between the directions of travel.

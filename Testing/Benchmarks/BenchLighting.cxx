@@ -7,6 +7,7 @@
  *
  *   bench-lighting [-n 64] [-w 512] [-f 5] [-d FOLDER]
  *   bench-lighting --psnr A.png B.png
+ *   bench-lighting --moves 64 128 256     what a light or the opacity that changes costs
  *
  * n^3 points, w^2 pixels, medians of f frames between which the camera turns a
  * little. With a folder, the volume and the pictures are written there, for
@@ -120,6 +121,77 @@ double psnr(vtkImageData* a, vtkImageData* b)
   return 10. * std::log10(255. * 255. * 3. * size[0] * size[1] / std::max(squares, 1.));
 }
 
+/**
+ * Milliseconds of what each frame does beside drawing, in a picture of 8^2 pixels: the difference
+ * to one whose lights stand.
+ */
+int measureMoves(const std::vector<int>& sizes)
+{
+  std::printf("Milliseconds more than a frame in which nothing changed, medians\n\n"
+              "| points | headlight turns | 2 lights | 5 lights | in colours, 1 | opacity changes, "
+              "exact | and harmonics |\n|---|---|---|---|---|---|---|\n");
+  for (const int n : sizes)
+  {
+    auto image = makeVolume(n);
+    vtkNew<vtkColorTransferFunction> color;
+    color->AddRGBPoint(0., 1., .9, .8);
+    vtkNew<vtkPiecewiseFunction> opacity;
+    opacity->AddPoint(0., 0.);
+    opacity->AddPoint(255., .15);
+    vtkNew<vtkVolumeProperty> property;
+    property->SetColor(color);
+    property->SetScalarOpacity(opacity);
+    property->SetScalarOpacityUnitDistance(.1);
+    property->SetAmbient(0.);
+    vtkNew<vtkLightTransportVolumeMapper> lit;
+    vtkNew<vtkVolumeLightingProperty> lighting;
+    lighting->SetVisibilityResolution(n);
+    lit->SetLightingProperty(lighting);
+    View view(lit, image, property, 8);
+    const auto median = [&](const std::function<void(int)>& change)
+    {
+      view.milliseconds();
+      view.milliseconds();
+      std::vector<double> times;
+      for (int f = 0; f < (n > 128 ? 3 : 9); ++f)
+      {
+        change(f);
+        times.push_back(view.milliseconds());
+      }
+      std::sort(times.begin(), times.end());
+      return times[times.size() / 2];
+    };
+    const auto turn = [&](int) { view.renderer->GetActiveCamera()->Azimuth(1.); };
+    const auto lights = [&](int count)
+    {
+      view.renderer->RemoveAllLights();
+      for (int i = 0; i < count; ++i)
+      {
+        vtkNew<vtkLight> light;
+        light->SetLightTypeToCameraLight();
+        light->SetPosition(.3 * i, .2 * i, 1.);
+        view.renderer->AddLight(light);
+      }
+      return median(turn);
+    };
+    lighting->SetNumberOfExactLights(0);
+    const double standing = lights(1);
+    lighting->SetNumberOfExactLights(8);
+    std::printf("| %d^3 | %.1f | %.1f | %.1f |", n, lights(1) - standing, lights(2) - standing,
+      lights(5) - standing);
+    lighting->SetColoredShadows(true);
+    std::printf(" %.1f |", lights(1) - standing);
+    lighting->SetColoredShadows(false);
+    lights(1);
+    const auto edit = [&](int f) { opacity->AddPoint(255., .15 + .001 * (f % 2)); };
+    const double exact = median(edit) - standing;
+    lighting->SetNumberOfExactLights(0);
+    std::printf(" %.0f | %.0f |\n", exact, median(edit) - standing);
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
 int compareFiles(const char* a, const char* b)
 {
   vtkNew<vtkPNGReader> readers[2];
@@ -141,6 +213,15 @@ int main(int argc, char* argv[])
   if (argc == 4 && std::string(argv[1]) == "--psnr")
   {
     return compareFiles(argv[2], argv[3]);
+  }
+  if (argc > 1 && std::string(argv[1]) == "--moves")
+  {
+    std::vector<int> sizes;
+    for (int i = 2; i < argc; ++i)
+    {
+      sizes.push_back(std::atoi(argv[i]));
+    }
+    return canRender() ? measureMoves(sizes) : Suite::skipped();
   }
   for (int i = 1; i + 1 < argc; i += 2)
   {

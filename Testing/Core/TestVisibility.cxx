@@ -593,6 +593,14 @@ void radius(Suite& suite)
     Values v(box.size(), -1.f);
     VisibilityTowards({ grid, box.data(), 1e4 }, w, v.data(), 1, SerialFor, nullptr);
     LT_CHECK(suite, v == all);
+    // What is kept from one sweep to the next changes nothing.
+    VisibilityScratch scratch;
+    for (int time = 0; time < 2; ++time)
+    {
+      v.assign(v.size(), -1.f);
+      VisibilityTowards({ grid, box.data(), 0. }, w, v.data(), 1, SerialFor, nullptr, &scratch);
+      LT_CHECK(suite, v == all);
+    }
   }
   // Around a wall: seen from closer than the radius, not from beyond.
   const Values wall = sample(grid, [](int i, int, int) { return i == 20 ? 100. : 0.; });
