@@ -14,10 +14,12 @@
  * (1 - visibility towards the light), A the same of the mean visibility. Where the
  * image has the point arrays
  *
- *   Extinction     the first four scene lights (vtkLight's SceneLight) have exact
- *                  fields of their own (one sweep when one of them moves),
- *   VisibilitySH   all other lights (headlights, camera lights, a fifth) are looked up
- *                  in the harmonics, through their window: softer, for nothing.
+ *   Extinction     the first eight lights, the camera's included, have exact fields
+ *                  of their own (one sweep when one of them moves); of red, green and
+ *                  blue (RGBExtinction), the first four, in colours,
+ *   VisibilitySH   all other lights are looked up in the harmonics, through their
+ *                  window: softer, for nothing. Without this array they are computed
+ *                  from Extinction where they are needed.
  *
  * Fragments beside the volume look along the ray to the light where it enters the
  * volume: the volume's shadow falls on a floor, too.
@@ -40,8 +42,7 @@
  *
  * Mappers with the same connection and volume share sweeps and textures in a window.
  *
- * The arrays have one channel: RGB extinction is refused. A problem is reported once,
- * by vtkErrorMacro, and the surface then drawn without shadows. The picture is VTK's
+ * A problem is reported once, by vtkErrorMacro, and the surface then drawn without shadows. The picture is VTK's
  * own, to the pixel, without a visibility and volume and with ShadowStrength and
  * AmbientOcclusion 0.
  *
@@ -73,7 +74,7 @@ public:
   ///@{
   /**
    * The visibility: an image with the point arrays VisibilitySH (1, 4, 9, 16 or 25
-   * components), Extinction (one), or both. A connection is updated when a frame is
+   * components, or three times as many), Extinction (one or three), or both. A connection is updated when a frame is
    * drawn. nullptr (default): the volume's, or, without one, VTK's picture.
    */
   void SetVisibilityConnection(vtkAlgorithmOutput* output);
@@ -93,9 +94,9 @@ public:
 
   ///@{
   /**
-   * Points along the longest axis of the visibility that is computed here: the volume's
-   * own, or every second, third... of them so that there are at most this many. At least
-   * 8, default 128.
+   * The visibility that is computed here has about this number to the power of three of
+   * points at most: the volume's own, or every second, third... of them along the axes on
+   * which they are closest. At least 8, default 128.
    */
   vtkSetClampMacro(VisibilityResolution, int, 8, VTK_INT_MAX);
   vtkGetMacro(VisibilityResolution, int);

@@ -64,13 +64,12 @@
  *   mapper->SetLightingProperty(lighting);
  * @endcode
  *
- * Composite blending has all of it; isosurfaces are lit without shadows (their
- * opacities are no extinction), or with those of a visibility of one's own; in
- * the other blend modes, and for rectilinear grids, lighting is left out. The
+ * Composite and isosurface blending have all of it; in the other blend modes, and for rectilinear grids, lighting is left out. The
  * visibility (vtkVisibilityFactorFilter) is computed from what the mapper draws:
  * opacities by scalar and gradient, 2-D transfer functions, components, masks,
- * cropping and clipping planes; when one of these changes, when a scene light with
- * an exact field moves (its own field alone), not for cameras and colours. Lighting
+ * cropping and clipping planes, isosurfaces; when one of these changes, when a light
+ * with an exact field moves (its own field alone; a headlight with its camera), not for
+ * colours. Lighting
  * comes first, then the light field over it. Samples without opacity are passed
  * over before they cost anything, so that a lit frame is often faster than VTK's
  * shaded one. Lights are where they are with respect to the world: the volume may
@@ -141,8 +140,8 @@ public:
 
   /**
    * A visibility of one's own: an image with the point array "VisibilitySH" of a
-   * vtkVisibilityFactorFilter and, for exact shadows of scene lights, "Extinction"
-   * (OutputExtinctionOn). nullptr (default): the mapper computes it from what it
+   * vtkVisibilityFactorFilter and, for exact shadows, "Extinction" (OutputExtinctionOn),
+   * in colours where it is RGBExtinction's. nullptr (default): the mapper computes it from what it
    * draws, masks, cropping and clipping included, whenever that changes.
    */
   virtual void SetVisibilityConnection(vtkAlgorithmOutput* output);

@@ -85,8 +85,8 @@ public:
   ///@{
   /**
    * Where a light's visibility comes from. Precomputed (default): from fields that
-   * are computed when the volume or its transfer functions change, for scene lights
-   * also when these move. RayTraced: a ray from each sample to each light, the slow
+   * are computed when the volume or its transfer functions change, and for exact lights
+   * (NumberOfExactLights) when these move with respect to the volume. RayTraced: a ray from each sample to each light, the slow
    * reference (of a volume drawn in partitions: as Precomputed); ambient occlusion and
    * environment are then as in Precomputed.
    * NoShadows: nothing occludes, neither lights nor environment.
@@ -163,8 +163,8 @@ public:
 
   ///@{
   /**
-   * How far before a surface, along its normal, visibility is looked up: in voxels of
-   * the visibility's grid, in [0,10] (clamped), default 3. With 0 the first layer of
+   * How far before a surface, along its normal, visibility is looked up: in steps of
+   * the visibility's grid in that direction, in [0,10] (clamped), default 3. With 0 the first layer of
    * voxels already shadows the surface that it is, as single scattering in a cloud
    * has it: opaque surfaces then have half their brightness. So does, towards the eye,
    * what is opaque within this length (from an optical depth of 1 on, fully from 4
@@ -226,9 +226,9 @@ public:
 
   ///@{
   /**
-   * Points of the visibility's grid along its longest axis: the volume's own, or
-   * every second, third... of them so that there are at most this many. At least 8,
-   * 128 by default.
+   * The visibility's grid has about this number to the power of three of points at most
+   * (up to a quarter more): the volume's own, or every second, third... of them along the
+   * axes on which they are closest. At least 8, 128 by default.
    */
   void SetVisibilityResolution(int points);
   vtkGetMacro(VisibilityResolution, int);
