@@ -532,10 +532,13 @@ bool VolumeLighting::Prepare(vtkGPUVolumeRayCastMapper* mapper, vtkRenderer* ren
     vtkNew<vtkMatrix4x4> worldToIndex;
     vtkMatrix4x4::Invert(volume->GetMatrix(), worldToIndex);
     vtkMatrix4x4::Multiply4x4(image->GetPhysicalToIndexMatrix(), worldToIndex, this->WorldToSteps);
-    for (int i = 0; i < 9; ++i)
+    for (int row = 0; row < 3; ++row)
     {
-      this->WorldToSteps->SetElement(
-        i / 3, i % 3, this->WorldToSteps->GetElement(i / 3, i % 3) / steps[i / 3]);
+      for (int column = 0; column < 3; ++column)
+      {
+        this->WorldToSteps->SetElement(
+          row, column, this->WorldToSteps->GetElement(row, column) / steps[row]);
+      }
     }
   }
   const double given = property->GetGradientThreshold();

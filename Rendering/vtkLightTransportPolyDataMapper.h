@@ -42,8 +42,8 @@
  *
  * Mappers with the same connection and volume share sweeps and textures in a window.
  *
- * A problem is reported once, by vtkErrorMacro, and the surface then drawn without shadows. The picture is VTK's
- * own, to the pixel, without a visibility and volume and with ShadowStrength and
+ * A problem is reported once, by vtkErrorMacro, and the surface then drawn without shadows. The
+ * picture is VTK's own, to the pixel, without a visibility and volume and with ShadowStrength and
  * AmbientOcclusion 0.
  *
  * Not for: shadows that surfaces cast (vtkShadowMapPass), composite data (the
@@ -74,8 +74,8 @@ public:
   ///@{
   /**
    * The visibility: an image with the point arrays VisibilitySH (1, 4, 9, 16 or 25
-   * components, or three times as many), Extinction (one or three), or both. A connection is updated when a frame is
-   * drawn. nullptr (default): the volume's, or, without one, VTK's picture.
+   * components, or three times as many), Extinction (one or three), or both. A connection is
+   * updated when a frame is drawn. nullptr (default): the volume's, or, without one, VTK's picture.
    */
   void SetVisibilityConnection(vtkAlgorithmOutput* output);
   void SetVisibilityData(vtkImageData* image);

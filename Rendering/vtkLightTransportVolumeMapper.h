@@ -64,9 +64,9 @@
  *   mapper->SetLightingProperty(lighting);
  * @endcode
  *
- * Composite and isosurface blending have all of it; in the other blend modes, and for rectilinear grids, lighting is left out. The
- * visibility (vtkVisibilityFactorFilter) is computed from what the mapper draws:
- * opacities by scalar and gradient, 2-D transfer functions, components, masks,
+ * Composite and isosurface blending have all of it; in the other blend modes, and for rectilinear
+ * grids, lighting is left out. The visibility (vtkVisibilityFactorFilter) is computed from what the
+ * mapper draws: opacities by scalar and gradient, 2-D transfer functions, components, masks,
  * cropping and clipping planes, isosurfaces; when one of these changes, when a light
  * with an exact field moves (its own field alone; a headlight with its camera), not for
  * colours. Lighting

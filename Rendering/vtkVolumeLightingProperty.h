@@ -86,10 +86,10 @@ public:
   /**
    * Where a light's visibility comes from. Precomputed (default): from fields that
    * are computed when the volume or its transfer functions change, and for exact lights
-   * (NumberOfExactLights) when these move with respect to the volume. RayTraced: a ray from each sample to each light, the slow
-   * reference (of a volume drawn in partitions: as Precomputed); ambient occlusion and
-   * environment are then as in Precomputed.
-   * NoShadows: nothing occludes, neither lights nor environment.
+   * (NumberOfExactLights) when these move with respect to the volume. RayTraced: a ray from each
+   * sample to each light, the slow reference (of a volume drawn in partitions: as Precomputed);
+   * ambient occlusion and environment are then as in Precomputed. NoShadows: nothing occludes,
+   * neither lights nor environment.
    */
   void SetShadowMode(int mode);
   vtkGetMacro(ShadowMode, int);
@@ -164,11 +164,11 @@ public:
   ///@{
   /**
    * How far before a surface, along its normal, visibility is looked up: in steps of
-   * the visibility's grid in that direction, in [0,10] (clamped), default 3. With 0 the first layer of
-   * voxels already shadows the surface that it is, as single scattering in a cloud
-   * has it: opaque surfaces then have half their brightness. So does, towards the eye,
-   * what is opaque within this length (from an optical depth of 1 on, fully from 4
-   * on), such as a cut through dense matter.
+   * the visibility's grid in that direction, in [0,10] (clamped), default 3. With 0 the first layer
+   * of voxels already shadows the surface that it is, as single scattering in a cloud has it:
+   * opaque surfaces then have half their brightness. So does, towards the eye, what is opaque
+   * within this length (from an optical depth of 1 on, fully from 4 on), such as a cut through
+   * dense matter.
    */
   void SetSurfaceOffset(double voxels);
   vtkGetMacro(SurfaceOffset, double);

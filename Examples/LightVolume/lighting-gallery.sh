@@ -41,4 +41,4 @@ run engine "$data/engine.nii.gz" --camera 130,25,1.15 \
   --tf 40:0:b0a79c,75:.1:c4bbb0,150:.2:cfc6ba,180:.9:e2925c
 run bonsai "$data/bonsai.nii.gz" --camera 20,12,1.15 \
   --tf 28:0:5d8a34,40:.3:7eb04a,70:.5:8d9a50,90:.6:aa835d,200:.8:d9b38f
-run seismic "$data/f3_crop.sgy" --camera 35,25,1 --shadow-strength .7
+run seismic "$data/f3_crop.sgy" --camera 35,25,1 --shadow-strength .5

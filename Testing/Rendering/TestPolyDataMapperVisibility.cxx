@@ -257,7 +257,8 @@ void exact(Suite& suite)
   LT_CHECK_NEAR(suite, colour(4.)[1], 0., 3.);
 }
 
-/** Where there are harmonics alone, a light looks these up: what the coefficients give through the window. */
+/** Where there are harmonics alone, a light looks these up: what the coefficients give through the
+ * window. */
 void harmonics(Suite& suite)
 {
   const auto shape = medium([](double x, double y, double z)

@@ -202,6 +202,31 @@ void closedForms(Suite& suite)
   }
 }
 
+/** From medium to surface: w = smoothstep(1/2, 2) of the gradient over the threshold, in data
+ * units. */
+void threshold(Suite& suite)
+{
+  // A ramp of 3 per length 2 along the view, opaque from within on.
+  auto image = makeGrid(9, 9, 9);
+  setScalars(image, [](const Point& p) { return 100. - 3. * p[0]; });
+  image->SetSpacing(2., 2., 2.);
+  BallScene scene(image);
+  scene.look({ 1., 0., 0. }, true);
+  scene.opacity->RemoveAllPoints();
+  scene.opacity->AddPoint(85., 0.);
+  scene.opacity->AddPoint(85.01, 1.);
+  scene.lighting->SetShadowModeToNoShadows();
+  scene.setSun(.5);
+  for (const double ratio : { .1, .5, .8, 1., 1.25, 1.6, 2., 9. })
+  {
+    scene.lighting->SetGradientThreshold(1.5 / ratio);
+    const double t = std::min(std::max((ratio - .5) / 1.5, 0.), 1.);
+    const double w = t * t * (3. - 2. * t);
+    // Of the surface cos 60 degrees, of the medium everything.
+    LT_CHECK_NEAR(suite, scene.green(), 1. - .5 * w, .01);
+  }
+}
+
 /** Light takes the transport colour of the ball: each channel's closed form. */
 void colors(Suite& suite)
 {
@@ -322,6 +347,7 @@ int main(int argc, char* argv[])
   }
   KeepDisplay keep;
   closedForms(suite);
+  threshold(suite);
   colors(suite);
   energy(suite);
   rotation(suite);

@@ -11,6 +11,7 @@
 #include "vtkHardwareSelector.h"
 #include "vtkLight.h"
 #include "vtkOpenGLRenderer.h"
+#include "vtkPlaneSource.h"
 #include "vtkPolyDataMapper.h"
 #include "vtkProperty.h"
 #include "vtkRenderStepsPass.h"
@@ -214,6 +215,55 @@ void withGeometry(Suite& suite)
   scene.mapper->ReleaseGraphicsResources(window);
 }
 
+/**
+ * A translucent plane within a homogeneous block, peeled: what lies before it, it, and what lies
+ * behind, in this order; and with the plane before and behind the block.
+ */
+void geometryWithin(Suite& suite)
+{
+  auto image = makeGrid(N, N, N);
+  setScalars(image, [](const Point&) { return 100.; });
+  SceneOfBalls scene(image, 32);
+  scene.property->SetAmbient(1.);
+  scene.property->SetDiffuse(0.);
+  scene.opacity->RemoveAllPoints();
+  scene.opacity->AddPoint(0., .04);
+  scene.lighting->SetAmbientOcclusion(0.);
+  scene.mapper->SetSampleDistance(.25F);
+  scene.look({ -1., 0., 0. }, true);
+  vtkNew<vtkPlaneSource> plane;
+  plane->SetOrigin(0., -40., -40.);
+  plane->SetPoint1(0., 40., -40.);
+  plane->SetPoint2(0., -40., 40.);
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputConnection(plane->GetOutputPort());
+  vtkNew<vtkActor> actor;
+  actor->SetMapper(mapper);
+  actor->GetProperty()->SetColor(0., 1., 0.);
+  actor->GetProperty()->LightingOff();
+  actor->GetProperty()->SetOpacity(.4);
+  scene.renderer->AddActor(actor);
+  scene.renderer->SetUseDepthPeeling(1);
+  scene.renderer->SetUseDepthPeelingForVolumes(true);
+  scene.renderer->SetMaximumNumberOfPeels(8);
+  const double sigma = -std::log(.96);
+  for (const double x : { -10., 7.75, 15.5, 23.25, 41. })
+  {
+    actor->SetPosition(x, 0., 0.);
+    scene.renderer->ResetCameraClippingRange();
+    const Color c = pixel(scene.capture(), 16, 16);
+    const double before = std::min(std::max(x, 0.), N - 1.);
+    const double front = std::exp(-sigma * before);
+    const double back = std::exp(-sigma * (N - 1. - before));
+    const double volume = .9 * (1. - front) + front * .6 * .9 * (1. - back);
+    std::cout << "plane at " << x << ": " << c[0] / 255. << " " << c[1] / 255. << ", closed form "
+              << volume << " " << volume + front * .4 << "\n";
+    LT_CHECK_NEAR(suite, c[0] / 255., volume, .015);
+    LT_CHECK_NEAR(suite, c[1] / 255., volume + front * .4, .015);
+  }
+  scene.renderer->RemoveActor(actor);
+}
+
 /** Radiance of 1 to 8: not clamped before the tone mapping, and linear. */
 void toneMapping(Suite& suite)
 {
@@ -358,6 +408,7 @@ int main(int argc, char* argv[])
   pictures(suite);
   withLightField(suite);
   withGeometry(suite);
+  geometryWithin(suite);
   toneMapping(suite);
   connection(suite);
   extremes(suite);
