@@ -164,7 +164,7 @@ std::string SharedVisibility::Prepare(vtkRenderer* renderer)
     this->Fields.back() = static_cast<int>(needs.lights.size());
     needs.lights.push_back(out);
   }
-  const std::string problem = this->Visibility.Prepare(this->Window, needs);
+  std::string problem = this->Visibility.Prepare(this->Window, needs);
   if (!problem.empty())
   {
     return problem;
