@@ -2324,27 +2324,31 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
           static_cast<std::int64_t>(
             2 * sizeof(T) + sizeof(Q) + sizeof(double) + sizeof(float) + 1));
     const double fraction = static_cast<double>(active) / static_cast<double>(size);
-    if (report.reason == StopReason::NoSteadyState)
+    if (report.reason == StopReason::NoSteadyState || report.reason == StopReason::NotFinite ||
+      report.reason == StopReason::Diverged)
     {
-      return wholeVolume();
+      std::fill(phi, phi + size, 0.);
+      return wholeVolume(); // it tells why, or does without the coarse grids of a region
     }
     publish(field.data());
-    if (report.reason != StopReason::Converged && report.reason != StopReason::MaxIterations)
+    if (report.reason == StopReason::Cancelled ||
+      (report.reason == StopReason::Breakdown && complete))
     {
       return finish(fraction);
     }
     // 3. what stands at its rim
     const auto rim = region.learn(phi, round < 3); // then it only grows: there is an end
     report.leaked = rim.leaked;
-    if (rim.expected > quarter)
-    {
-      return wholeVolume();
-    }
     const std::int64_t before = region.size();
-    const bool ended = region.advance(std::max(first, 2 * region.lit()));
+    const bool ended = region.advance(std::max(first, region.lit()));
     if ((complete && !region.grown()) || late)
     {
       return finish(fraction);
+    }
+    // Measured: regions become two or three times what is expected early on.
+    if (rim.expected > 0.4 * quarter)
+    {
+      return wholeVolume();
     }
     // rows of the last operator do for a region that is hardly smaller
     rebuild = region.grown() || 4 * before < 3 * active;

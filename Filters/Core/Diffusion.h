@@ -130,7 +130,10 @@ struct DiffusionControl
   double targetError = 0.;
   /** Where above 0, seconds after which the best answer so far is returned (MaxIterations). */
   double timeBudget = 0.;
-  /** Of solveActive: the largest part of the voxels that is solved for as a region, in (0, 1]. */
+  /**
+   * Of solveActive: the largest part of the voxels that is solved for as a region, in (0, 1]; where
+   * more than 0.4 of that is expected before the region is known, the whole volume is solved.
+   */
   double largestRegion = 0.25;
   /**
    * Of solveActive: where the region would be larger, answer MaxIterations with an activeFraction

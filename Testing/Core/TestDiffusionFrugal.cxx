@@ -259,7 +259,7 @@ void threads(Suite& suite)
     control.progress = [](double) { return true; };
     if (active)
     {
-      control.largestRegion = 0.6;
+      control.largestRegion = 1.;
       return solver.solveActive(scene.medium(), scene.q.data(), phi.data(), control, 1e-3);
     }
     solver.setMedium(scene.medium());
