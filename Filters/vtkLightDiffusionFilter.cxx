@@ -851,6 +851,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       lighttransport::DiffusionControl own = control;
       own.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
       own.regionOrNothing = true;
+      own.largestRegion = 0.125; // the cost of finding out goes with it, the gain against it
       before = withMedium([&](const auto& medium)
         { return regional.solveActive(medium, q, phi.data(), own, this->ActiveThreshold); });
       using lighttransport::StopReason;

@@ -306,8 +306,8 @@ public:
    * voxels within six decades of the largest |phi*|, with phi* the exact solution of the discrete
    * equations on the full grid. Where above 0, a steady solve chooses what does, in this order:
    * from the last state, with Continue, cells of two points and corrections by the full grid's
-   * equations; where light stays in less than a quarter of the volume, that region alone (to find
-   * out costs some per cent); the full grid, with as many iterations as it takes.
+   * equations; where light stays in less than an eighth of the volume, that region alone (to find
+   * out costs up to a fifth of a solve); the full grid, with as many iterations as it takes.
    * GetEstimatedError tells what was reached, GetActiveFraction, GetUsedCoarseningFactor and
    * GetNumberOfIterationsUsed what was chosen; Tolerance only ends it earlier. Default 0: Tolerance
    * decides.
