@@ -267,10 +267,12 @@ public:
 
   ///@{
   /**
-   * Steady only: solve on tiles around the sources, grown while more than ActiveThreshold (of the
-   * largest |phi|) stands at their border, with phi = 0 beyond: light that stays in a vessel does
-   * not cost the whole volume; light that fills a quarter of it is solved on the whole,
-   * after the rounds that found it. Fluence is 0 outside. Default off: the residual's equations
+   * Steady only: solve on the points that light reaches from the sources, foretold by a front and
+   * grown while more than ActiveThreshold (of the largest |phi|) would stand beyond, with phi = 0
+   * there: light that stays in a vessel does not cost the whole volume; light that fills a quarter
+   * of it, or is expected to fill a tenth, is solved on the whole after what found that out. With
+   * TargetError the threshold is at most 1e-6 sqrt(TargetError), so that the cut does not show in
+   * it. Fluence is 0 outside. Default off: the residual's equations
    * hold everywhere.
    */
   vtkSetMacro(ActiveRegion, bool);
