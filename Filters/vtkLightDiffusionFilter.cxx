@@ -845,13 +845,18 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   {
     DiffusionReport before;
     before.reason = lighttransport::StopReason::BadInput;
-    // Light that stays where it is: its region alone. To find out costs some per cent of a solve.
+    const double perPoint = this->TimeBudget / static_cast<double>(size);
+    // Light that stays where it is: its region alone. To find out costs some per cent of a solve,
+    // and 30 ms at the least.
+    if (!(this->TimeBudget > 0. && this->TimeBudget < 0.06))
     {
       lighttransport::DiffusionSolver regional(vtkLightTransportParallelFor());
       lighttransport::DiffusionControl own = control;
       own.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
       own.regionOrNothing = true;
-      own.largestRegion = 0.125; // the cost of finding out goes with it, the gain against it
+      // the cost of finding out goes with it, the gain against it
+      own.largestRegion =
+        this->TimeBudget > 0. ? std::min(0.125, 0.125 * perPoint / 300e-9) : 0.125;
       before = withMedium([&](const auto& medium)
         { return regional.solveActive(medium, q, phi.data(), own, this->ActiveThreshold); });
       using lighttransport::StopReason;
@@ -869,9 +874,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       setupSeconds += before.seconds;
       before.reason = lighttransport::StopReason::BadInput;
     }
-    const double perPoint = this->TimeBudget / static_cast<double>(size);
     // A budget that the full grid's set-up may exceed. How fast this machine is today, its first
-    // part tells: the rest, and one iteration, takes six times as long.
+    // part tells: the rest, and one iteration, takes nine times as long.
     bool hasty = this->TimeBudget > 0. && perPoint < 25e-9 && !(kept.valid && key == kept.key);
     if (!hasty && this->TimeBudget > 0. && perPoint < 150e-9 && !(kept.valid && key == kept.key))
     {
@@ -881,7 +885,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
         before.message = problem;
         return before;
       }
-      hasty = timeLeft() < 6. * (setupSeconds - beforeSeconds);
+      hasty = timeLeft() < 9. * (setupSeconds - beforeSeconds);
     }
     if (hasty)
     {
