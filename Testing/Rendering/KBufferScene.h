@@ -17,6 +17,7 @@
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
 #include "vtkDualDepthPeelingPass.h"
+#include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLRenderer.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
@@ -138,6 +139,23 @@ inline int largestDifference(
   return largest;
 }
 
+/** What KHR_debug has told of errors so far, in all windows of KBufferScene. */
+inline int& openGLDebugErrors()
+{
+  static int count = 0;
+  return count;
+}
+
+inline void GLAPIENTRY countDebugErrors(
+  GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar* message, const void*)
+{
+  if (type == GL_DEBUG_TYPE_ERROR)
+  {
+    ++openGLDebugErrors();
+    std::cout << "OpenGL: " << message << "\n";
+  }
+}
+
 /** A window and a renderer with the pass under test. */
 struct KBufferScene
 {
@@ -145,6 +163,7 @@ struct KBufferScene
   vtkNew<vtkRenderer> renderer;
   vtkNew<vtkBucketedKBufferPass> pass;
   vtkNew<MessageLog> log;
+  bool watched = false;
 
   explicit KBufferScene(int width = 40, int height = 30)
   {
@@ -179,7 +198,21 @@ struct KBufferScene
     }
   }
 
-  std::vector<unsigned char> capture() { return captureRgba(this->window); }
+  std::vector<unsigned char> capture()
+  {
+    if (!this->watched)
+    {
+      this->watched = true;
+      vtkOpenGLRenderWindow::SafeDownCast(this->window)->Initialize();
+      if (glDebugMessageCallback)
+      {
+        glEnable(GL_DEBUG_OUTPUT);
+        glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+        glDebugMessageCallback(countDebugErrors, nullptr);
+      }
+    }
+    return captureRgba(this->window);
+  }
 
   /** VTK's exact pass in place of ours. */
   void peel()

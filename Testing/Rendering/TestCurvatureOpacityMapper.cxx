@@ -324,5 +324,6 @@ int main(int argc, char* argv[])
   testProperties(suite);
   testStock(suite);
   testMany(suite);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

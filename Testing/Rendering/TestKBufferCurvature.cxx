@@ -428,5 +428,6 @@ int main(int argc, char* argv[])
   testOpacity(suite);
   testColors(suite);
   testRadianceScaling(suite);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

@@ -43,5 +43,6 @@ int main(int argc, char* argv[])
       scene.log->messages[0].find("expected 4.3") != std::string::npos);
   LT_CHECK(suite, scene.pass->GetNumberOfMergedFragments() == 0);
   LT_CHECK(suite, openGLErrors().empty());
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

@@ -209,5 +209,6 @@ int main(int argc, char* argv[])
   Suite suite(argc, argv);
   testWaves(suite);
   testContours(suite);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

@@ -7,6 +7,9 @@
  */
 #include "KBufferScene.h"
 
+#include "vtkCurvatureOpacityProperty.h"
+#include "vtkPiecewiseFunction.h"
+
 using namespace lighttransport::testing;
 
 namespace
@@ -41,6 +44,32 @@ void testOver(Suite& suite)
       }
     }
   }
+}
+
+/** As many layers as there can be, plain and with a style that changes nothing. */
+void testMost(Suite& suite)
+{
+  KBufferScene scene(24, 20);
+  scene.pass->SetNumberOfLayers(65); // clamped
+  LT_CHECK(suite, scene.pass->GetNumberOfLayers() == 64);
+  auto layers = randomLayers(64, 13, .01, .1);
+  layers.back().tilt = 3.17;
+  scene.add(layers);
+  for (const bool styled : { false, true })
+  {
+    vtkNew<vtkPiecewiseFunction> one;
+    one->AddPoint(-1., 1.);
+    one->AddPoint(1., 1.);
+    scene.pass->GetCurvatureOpacityProperty()->SetShadingFunction(one);
+    scene.pass->GetCurvatureOpacityProperty()->SetCurvatureShading(styled);
+    const double d = scene.differenceFromOver(scene.capture(), layers, false);
+    suite.check(d <= 1.5, "64 layers, styled " + std::to_string(styled) + ": " + std::to_string(d),
+      __FILE__, __LINE__);
+    LT_CHECK(suite, scene.pass->GetNumberOfFragments() == 64 * 24 * 20);
+    LT_CHECK(suite, scene.pass->GetNumberOfMergedFragments() == 0);
+  }
+  scene.pass->SetNumberOfLayers(0);
+  LT_CHECK(suite, scene.pass->GetNumberOfLayers() == 1);
 }
 
 /** Ties in depth, intersections and a merged tail among them. */
@@ -227,10 +256,12 @@ int main(int argc, char* argv[])
   }
   Suite suite(argc, argv);
   testOver(suite);
+  testMost(suite);
   testPermutations(suite);
   testTail(suite);
   testOpaque(suite);
   testBackground(suite);
   testBands(suite);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

@@ -477,5 +477,6 @@ int main(int argc, char* argv[])
   testImageSlice(suite);
   testStranger(suite);
   testText(suite);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

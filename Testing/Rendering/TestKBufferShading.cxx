@@ -147,5 +147,6 @@ int main(int argc, char* argv[])
   }
   Suite suite(argc, argv);
   testOtherPasses(suite);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }

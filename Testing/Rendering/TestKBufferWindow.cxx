@@ -12,6 +12,7 @@
 #include "vtkCompositeDataDisplayAttributes.h"
 #include "vtkCompositePolyDataMapper2.h"
 #include "vtkCubeSource.h"
+#include "vtkCurvatureOpacityProperty.h"
 #include "vtkElevationFilter.h"
 #include "vtkHardwareSelector.h"
 #include "vtkImageData.h"
@@ -33,35 +34,11 @@ using namespace lighttransport::testing;
 
 namespace
 {
-int debugErrors = 0;
-
-void GLAPIENTRY countErrors(
-  GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar* message, const void*)
-{
-  if (type == GL_DEBUG_TYPE_ERROR)
-  {
-    ++debugErrors;
-    std::cout << "OpenGL: " << message << "\n";
-  }
-}
-
-void watchErrors()
-{
-  if (glDebugMessageCallback)
-  {
-    glEnable(GL_DEBUG_OUTPUT);
-    glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
-    glDebugMessageCallback(countErrors, nullptr);
-  }
-}
-
 void testSizes(Suite& suite)
 {
   const auto layers = randomLayers(6, 3);
   KBufferScene scene(20, 20);
   scene.add(layers);
-  scene.window->Render();
-  watchErrors();
   const int sizes[][2] = { { 1, 1 }, { 1, 50 }, { 70, 1 }, { 33, 17 }, { 200, 150 }, { 2, 2 } };
   for (const auto& size : sizes)
   {
@@ -156,6 +133,45 @@ void testWindows(Suite& suite)
   scene.window->Finalize();
   LT_CHECK(suite, scene.pass->GetMemoryInBytes() == 0);
   LT_CHECK(suite, scene.log->messages.empty());
+}
+
+/** Buffers, textures and framebuffers of the context that is current. */
+std::array<int, 3> countObjects()
+{
+  std::array<int, 3> count = { 0, 0, 0 };
+  for (GLuint name = 1; name < 3000; ++name)
+  {
+    count[0] += glIsBuffer(name);
+    count[1] += glIsTexture(name);
+    count[2] += glIsFramebuffer(name);
+  }
+  return count;
+}
+
+/** Whatever was on and whatever the size was: a release leaves nothing of the pass. */
+void testRelease(Suite& suite)
+{
+  KBufferScene scene;
+  scene.add(randomLayers(6, 3));
+  scene.capture();
+  scene.pass->ReleaseGraphicsResources(scene.window);
+  const auto expected = countObjects();
+  auto* property = scene.pass->GetCurvatureOpacityProperty();
+  for (int round = 0; round < 4; ++round)
+  {
+    property->SetCurvatureShading(round == 1);
+    property->SetOccludingContours(round == 2);
+    scene.pass->SetColorPrecision(round % 2);
+    scene.pass->SetMemoryLimit(round == 3 ? 1 << 20 : 1 << 30);
+    scene.capture();
+    const auto used = countObjects();
+    LT_CHECK(suite, used[0] > expected[0] + 3 && used[1] > expected[1] + 3);
+    LT_CHECK(suite, scene.pass->GetMemoryInBytes() > 0);
+    scene.pass->ReleaseGraphicsResources(scene.window);
+    LT_CHECK(suite, countObjects() == expected);
+    LT_CHECK(suite, scene.pass->GetMemoryInBytes() == 0);
+  }
+  LT_CHECK(suite, openGLErrors().empty());
 }
 
 void testMultisamples(Suite& suite)
@@ -455,9 +471,10 @@ int main(int argc, char* argv[])
   testSizes(suite);
   testViewports(suite);
   testWindows(suite);
+  testRelease(suite);
   testMultisamples(suite);
   testSelection(suite);
   testMappers(suite);
-  LT_CHECK(suite, debugErrors == 0);
+  LT_CHECK(suite, openGLDebugErrors() == 0);
   return suite.result();
 }
