@@ -192,8 +192,9 @@ Function Labyrinth(int n, int width, double wall, unsigned seed)
     {
       return 1.;
     }
-    const std::size_t room =
-      static_cast<std::size_t>(at[0] / pitch + rooms * (at[1] / pitch + rooms * (at[2] / pitch)));
+    const auto along = [&](int d) { return static_cast<std::size_t>(at[d] / pitch); };
+    const std::size_t across = static_cast<std::size_t>(rooms);
+    const std::size_t room = along(0) + across * (along(1) + across * along(2));
     return walls == 1 && (doors[room] >> axis & 1) ? 1. : wall;
   };
 }
