@@ -373,18 +373,17 @@ LIGHTTRANSPORT_INLINE double largestOf(std::int64_t n, const T* LIGHTTRANSPORT_R
   std::memcpy(&top, &greatest, sizeof(T));
   constexpr Bits minusZero = Bits(1) << (8 * sizeof(T) - 1);
   Bits most = 0;
-  Bits bad = 0;
   for (std::int64_t i = 0; i < n; ++i)
   {
+    const T value = a[i];
     Bits bits;
-    std::memcpy(&bits, a + i, sizeof(T));
+    std::memcpy(&bits, &value, sizeof(T));
     bits = bits == minusZero ? 0 : bits;
-    bad |= bits > top ? 1 : 0;
-    most = bits > most ? bits : most;
+    most = bits > most ? bits : most; // what is not finite or below 0 is above the greatest
   }
   T largest;
   std::memcpy(&largest, &most, sizeof(T));
-  return bad ? -1. : static_cast<double>(largest);
+  return most > top ? -1. : static_cast<double>(largest);
 }
 LIGHTTRANSPORT_SIMD
 double largestRow(std::int64_t n, const float* a)
@@ -430,24 +429,38 @@ LIGHTTRANSPORT_SIMD
 void summarise(int n, const float* gx, const float* gy, const float* gyS, const float* gz,
   const float* gzB, const float* s, OperatorSummary& summary)
 {
-  float diagonal = 0.f;
-  float gershgorin = 0.f;
-  float most = 0.f;
-  float least = std::numeric_limits<float>::max();
+  // values >= 0 are in the order of their bits, whose extremes are found in vectors
+  const auto bitsOf = [](float value)
+  {
+    std::int32_t bits;
+    std::memcpy(&bits, &value, sizeof(bits));
+    return bits;
+  };
+  std::int32_t diagonal = 0;
+  std::int32_t gershgorin = 0;
+  std::int32_t most = 0;
+  std::int32_t least = std::numeric_limits<std::int32_t>::max();
   for (int i = 0; i < n; ++i)
   {
     const float faces = gx[i] + gx[i - 1] + gy[i] + gyS[i] + gz[i] + gzB[i];
-    const float all = faces + s[i];
-    const float twice = faces + all;
+    const std::int32_t all = bitsOf(faces + s[i]);
+    const std::int32_t twice = bitsOf(faces + (faces + s[i]));
+    const std::int32_t sink = bitsOf(s[i]);
     diagonal = all > diagonal ? all : diagonal;
     gershgorin = twice > gershgorin ? twice : gershgorin;
-    most = s[i] > most ? s[i] : most;
-    least = s[i] < least ? s[i] : least;
+    most = sink > most ? sink : most;
+    least = sink < least ? sink : least;
   }
-  summary.diagonal = diagonal;
-  summary.gershgorin = gershgorin;
-  summary.sink = most > NoSink;
-  summary.noSink = !(least > NoSink);
+  const auto valueOf = [](std::int32_t bits)
+  {
+    float value;
+    std::memcpy(&value, &bits, sizeof(value));
+    return value;
+  };
+  summary.diagonal = valueOf(diagonal);
+  summary.gershgorin = valueOf(gershgorin);
+  summary.sink = valueOf(most) > NoSink;
+  summary.noSink = !(least > bitsOf(NoSink));
 }
 
 template <class T>
@@ -1026,13 +1039,21 @@ void DiffusionSolver::setShift(double value)
   this->multigridReady = false;
 }
 
-void DiffusionSolver::prepareMultigrid(const ParallelFor& loop)
+void DiffusionSolver::prepareMultigrid(const MultigridWork& work, const ParallelFor& loop)
 {
   if (!this->multigridReady)
   {
     this->storeFaces();
-    this->multigrid.setup(this->A, loop);
+    this->multigrid.setup(this->A, work, loop);
     this->multigridReady = true;
+    // kernels read values beside a row, times a face of 0: that must be finite
+    const std::int64_t n = this->box.dims[0];
+    ForEachRow(this->A, this->parallelFor,
+      [&](std::int64_t row, std::int64_t, int)
+      {
+        std::fill(work.first + row * n, work.first + (row + 1) * n, 0.f);
+        std::fill(work.second + row * n, work.second + (row + 1) * n, 0.f);
+      });
   }
 }
 
@@ -1443,13 +1464,15 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   };
   const ParallelFor& loop = control.progress ? watched : this->parallelFor;
 
+  Buffer<float> Ap(size, this->A.pages);
+  Buffer<float> p(size, this->A.pages);
   // A set-up that is given up half-way is none: what it has made goes.
   struct GivenUp
   {
   };
   try
   {
-    this->prepareMultigrid(
+    this->prepareMultigrid({ Ap.data(), p.data() },
       [&](std::int64_t n, const RangeBody& body)
       {
         loop(n, body);
@@ -1473,10 +1496,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   {
     this->forgetFaces();
   }
-  Buffer<float> Ap(size, this->A.pages);
   Buffer<float> own(frugal ? 0 : size, this->A.pages);
   Buffer<float>& z = frugal ? Ap : own;
-  Buffer<float> p(size, this->A.pages);
   report.bytes = std::max(report.bytes, this->bytesHeld() + op.activeSize * (frugal ? 20 : 24));
 
   const double rStart = rNorm;

@@ -14,11 +14,14 @@ namespace
 using Weights = MultigridWeights;
 
 /** A tile of rows has so many values per plane, and so many planes: see skew(). */
-constexpr std::int64_t TileValues = 12288;
+constexpr std::int64_t TileValues = 4096;
 constexpr int TilePlanes = 16;
 
 /** A coarse diagonal is at least this part of Galerkin's, see Multigrid::raise. */
 constexpr float LeastPart = 0.3f;
+
+/** Levels 1 to this take two steps of conjugate gradients, see Multigrid::solveCoarse. */
+constexpr std::size_t AcceleratedLevels = 2;
 
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
@@ -261,26 +264,61 @@ inline float halfResistance(float g)
   return 0.5f / (g > 1e-30f ? g : 1e-30f);
 }
 
+/** What the two halves of a line and the face between them weigh. */
+struct Line
+{
+  float here, there, open;
+};
+LIGHTTRANSPORT_INLINE Line lineThrough(float between, float below, float above, bool paired)
+{
+  Line line;
+  line.here = halfResistance(below);
+  line.there = paired ? halfResistance(above) : 0.f;
+  const float whole = line.here + 1.f / (between > 1e-30f ? between : 1e-30f) + line.there;
+  line.open = between > 1e-30f ? 255.f / whole : 0.f;
+  return line;
+}
+
 /**
- * The lines through the faces f = first, first + step, ... < last of a row, from
- * coarse centre to coarse centre: half the inner face on either side (`below`,
- * `above`) in series with the face between. Where the voxel above is its own centre
- * (f >= paired, or no `above`), there is no inner face there. Writes the weight of the
- * other parent for both voxels at the face.
+ * The lines through the faces after the odd voxels i of a row, first <= i < last, from coarse
+ * centre to coarse centre: half the inner face on either side in series with the face between.
+ * From `paired` on the voxel above is its own centre: there is no inner face there. Writes the
+ * weight of the other parent for both voxels at the face.
  */
 LIGHTTRANSPORT_SIMD
-void lineRow(int first, int last, int step, int paired, const float* between, const float* below,
-  const float* above, std::uint8_t* w, std::uint8_t* wNext)
+void lineAlong(int first, int last, int paired, const float* g, std::uint8_t* w)
 {
-  for (int i = first; i < last; i += step)
+  for (int i = first; i < last; i += 2)
   {
-    const float g = between[i];
-    const float here = halfResistance(below[i]);
-    const float there = above && i < paired ? halfResistance(above[i]) : 0.f;
-    const float whole = here + 1.f / (g > 1e-30f ? g : 1e-30f) + there;
-    const float open = g > 1e-30f ? 255.f / whole : 0.f;
-    w[i] = static_cast<std::uint8_t>(here * open + 0.5f);
-    wNext[i] = static_cast<std::uint8_t>(there * open + 0.5f);
+    const Line line = lineThrough(g[i], g[i - 1], g[i + 1], i < paired);
+    w[i] = static_cast<std::uint8_t>(line.here * line.open + 0.5f);
+    w[i + 1] = static_cast<std::uint8_t>(line.there * line.open + 0.5f);
+  }
+}
+
+/** The same across rows, for the voxels below (or above) the faces; `above` may be null. */
+LIGHTTRANSPORT_SIMD
+void lineAcross(int n, const float* between, const float* below, const float* above, bool isAbove,
+  std::uint8_t* LIGHTTRANSPORT_RESTRICT w)
+{
+  const bool paired = above != nullptr;
+  const float* top = paired ? above : below;
+  for (int i = 0; i < n; ++i)
+  {
+    const Line line = lineThrough(between[i], below[i], top[i], paired);
+    w[i] = static_cast<std::uint8_t>((isAbove ? line.there : line.here) * line.open + 0.5f);
+  }
+}
+
+/** The red voxels 2 I + odd of a row, first <= I < last. */
+LIGHTTRANSPORT_SIMD
+void packRow(int first, int last, int odd, const std::uint8_t* LIGHTTRANSPORT_RESTRICT all,
+  std::uint8_t* LIGHTTRANSPORT_RESTRICT red)
+{
+  const std::uint8_t* from = all + odd;
+  for (int I = first; I < last; ++I)
+  {
+    red[I] = from[2 * I];
   }
 }
 
@@ -319,13 +357,11 @@ void keepRow(int n, const float* LIGHTTRANSPORT_RESTRICT tie,
   }
 }
 
-/** own += v kept fy fz (1 - wx), next += v kept fy fz wx; kept may be null: 1 */
+/** own += v fy fz (1 - wx), next += v fy fz wx */
 LIGHTTRANSPORT_SIMD
-void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const std::uint8_t* kept,
-  const Weights& x, const Weights& y, const Weights& z, float* LIGHTTRANSPORT_RESTRICT own,
-  float* LIGHTTRANSPORT_RESTRICT next)
+void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const Weights& x, const Weights& y,
+  const Weights& z, float* LIGHTTRANSPORT_RESTRICT own, float* LIGHTTRANSPORT_RESTRICT next)
 {
-  constexpr float unit = 1.f / 255.f;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT x0 = x.here;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT x1 = x.there;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT y0 = y.here;
@@ -335,8 +371,8 @@ void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const std::uint8_t
   const float cy = y.factor, sy = y.slope, cz = z.factor, sz = z.slope;
   for (int i = 0; i < n; ++i)
   {
-    const float t = v[i] * (kept ? unit * static_cast<float>(kept[i]) : 1.f) *
-      (cy + sy * static_cast<float>(y0[i] + y1[i])) * (cz + sz * static_cast<float>(z0[i] + z1[i]));
+    const float t = v[i] * (cy + sy * static_cast<float>(y0[i] + y1[i])) *
+      (cz + sz * static_cast<float>(z0[i] + z1[i]));
     const float u = t * (static_cast<float>(x0[i] + x1[i]) * (0.5f / 255.f));
     own[i] += t - u;
     next[i] += u;
@@ -378,25 +414,22 @@ void gatherFacesRow(int n, const float* LIGHTTRANSPORT_RESTRICT between,
 
 /**
  * The faces after odd voxels of a row, which alone lie between coarse ones, and their inner
- * faces: masked, masked + room and masked + 2 room. x is the first voxel's coordinate of n.
+ * faces. x is the first voxel's coordinate of n.
  */
 LIGHTTRANSPORT_SIMD
-void maskFacesRow(int count, int x, int n, float noResistance, const float* g, std::size_t room,
-  float* LIGHTTRANSPORT_RESTRICT masked)
+void maskFacesRow(int count, int x, int n, const float* g, float* LIGHTTRANSPORT_RESTRICT masked,
+  float* LIGHTTRANSPORT_RESTRICT below, float* LIGHTTRANSPORT_RESTRICT above)
 {
-  float* LIGHTTRANSPORT_RESTRICT below = masked + room;
-  float* LIGHTTRANSPORT_RESTRICT above = masked + 2 * room;
   for (int i = 0; i < count; ++i)
   {
-    const float face = static_cast<float>(x + i + 1 < n ? (x + i) & 1 : 0);
+    const float face = static_cast<float>((x + i) & 1);
     masked[i] = face * g[i];
     below[i] = face * g[i - 1];
     above[i] = face * g[i + 1];
   }
-  const int last = n - 2 - x; // its voxel above is its own centre
-  if (last >= 0 && last < count && (n & 1) == 1)
+  if (x + count == n)
   {
-    above[last] = noResistance;
+    masked[count - 1] = below[count - 1] = above[count - 1] = 0.f; // no face there
   }
 }
 
@@ -462,42 +495,55 @@ void energyAlong(int n, bool halved, const float* LIGHTTRANSPORT_RESTRICT g,
   }
 }
 
-/** Raises a coarse row's sinks where its diagonal is below a part of the energy: own and next. */
+/** A coarse row from what its fine rows gave to their own columns and to the next ones. */
 LIGHTTRANSPORT_SIMD
-void raiseRow(int begin, int end, bool halved, float part, const float* own, const float* next,
-  const RowFaces& f, float* LIGHTTRANSPORT_RESTRICT s)
+void columnRow(int begin, int end, bool halved, const float* own, const float* next,
+  float* LIGHTTRANSPORT_RESTRICT out)
 {
+  if (!halved)
+  {
+    std::copy(own + begin, own + end, out + begin);
+    return;
+  }
   for (int i = begin; i < end; ++i)
   {
-    const float energy =
-      halved ? own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2] : own[i];
-    const int at = i - begin;
-    const float diagonal =
-      f.gx[at] + f.gx[at - 1] + f.gy[at] + f.gyS[at] + f.gz[at] + f.gzB[at] + s[at];
-    const float missing = part * energy - diagonal;
-    s[at] += missing > 0.f ? missing : 0.f;
+    out[i] = own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2];
   }
 }
 
-/** The coarse faces [begin, end) from the sums over the lines: own and next, see gatherFacesRow. */
+/** Raises a row's sinks where its diagonal is below a part of the energy. */
 LIGHTTRANSPORT_SIMD
-void seriesRow(int begin, int end, bool halved, const float* own, const float* next,
-  std::size_t room, float* LIGHTTRANSPORT_RESTRICT out)
+void raiseRow(int n, float part, const float* LIGHTTRANSPORT_RESTRICT energy, const RowFaces& f,
+  float* LIGHTTRANSPORT_RESTRICT s)
 {
-  const float* own1 = own + room;
-  const float* own2 = own + 2 * room;
-  const float* next1 = next + room;
-  const float* next2 = next + 2 * room;
-  const auto sum = [halved](const float* p, const float* q, int i)
-  { return halved ? p[2 * i] + p[2 * i + 1] + q[2 * i - 1] + q[2 * i + 2] : p[i]; };
-  for (int i = begin; i < end; ++i)
+  const float* gx = f.gx;
+  const float* gy = f.gy;
+  const float* gyS = f.gyS;
+  const float* gz = f.gz;
+  const float* gzB = f.gzB;
+  for (int i = 0; i < n; ++i)
   {
-    const float between = sum(own, next, i);
-    const float below = sum(own1, next1, i);
-    const float above = sum(own2, next2, i);
-    const bool open = between > 1e-25f && below > 1e-25f && above > 1e-25f;
-    const float resistance = open ? 0.5f / below + 1.f / between + 0.5f / above : 1.f;
-    out[i] = open ? 1.f / resistance : 0.f;
+    const float diagonal = gx[i] + gx[i - 1] + gy[i] + gyS[i] + gz[i] + gzB[i] + s[i];
+    const float missing = part * energy[i] - diagonal;
+    s[i] += missing > 0.f ? missing : 0.f;
+  }
+}
+
+/** The coarse faces from the sums over the lines, see gatherFacesRow. */
+LIGHTTRANSPORT_SIMD
+void seriesRow(int n, const float* between, const float* below, const float* above,
+  float* LIGHTTRANSPORT_RESTRICT out)
+{
+  constexpr float least = 1e-25f;
+  for (int i = 0; i < n; ++i)
+  {
+    const float b = between[i];
+    const float l = below[i];
+    const float u = above[i];
+    const float resistance =
+      0.5f / (l > least ? l : 1.f) + 1.f / (b > least ? b : 1.f) + 0.5f / (u > least ? u : 1.f);
+    const float smallest = l < b ? (l < u ? l : u) : (b < u ? b : u);
+    out[i] = smallest > least ? 1.f / resistance : 0.f;
   }
 }
 
@@ -506,29 +552,24 @@ void seriesRow(int begin, int end, bool halved, const float* own, const float* n
  * own[m] goes to I, next[m] to I's neighbour along x.
  */
 LIGHTTRANSPORT_SIMD
-void depositRow(int first, int last, const MultigridLine& v, const float* r, float* const* own,
-  float* const* next)
+void depositRow(int first, int last, const MultigridLine& v, const float* LIGHTTRANSPORT_RESTRICT r,
+  float* LIGHTTRANSPORT_RESTRICT o0, float* LIGHTTRANSPORT_RESTRICT o1,
+  float* LIGHTTRANSPORT_RESTRICT o2, float* LIGHTTRANSPORT_RESTRICT o3,
+  float* LIGHTTRANSPORT_RESTRICT n0, float* LIGHTTRANSPORT_RESTRICT n1,
+  float* LIGHTTRANSPORT_RESTRICT n2, float* LIGHTTRANSPORT_RESTRICT n3)
 {
   constexpr float unit = 1.f / 255.f;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx = v.wx + v.odd;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy = v.wy + v.odd;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz = v.wz + v.odd;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept = v.kept + v.odd;
-  const float* LIGHTTRANSPORT_RESTRICT value = r + v.odd;
-  float* LIGHTTRANSPORT_RESTRICT o0 = own[0];
-  float* LIGHTTRANSPORT_RESTRICT o1 = own[1];
-  float* LIGHTTRANSPORT_RESTRICT o2 = own[2];
-  float* LIGHTTRANSPORT_RESTRICT o3 = own[3];
-  float* LIGHTTRANSPORT_RESTRICT n0 = next[0];
-  float* LIGHTTRANSPORT_RESTRICT n1 = next[1];
-  float* LIGHTTRANSPORT_RESTRICT n2 = next[2];
-  float* LIGHTTRANSPORT_RESTRICT n3 = next[3];
+  const std::uint8_t* wx = v.wx;
+  const std::uint8_t* wy = v.wy;
+  const std::uint8_t* wz = v.wz;
+  const std::uint8_t* kept = v.kept;
+  const float* value = r + v.odd;
   for (int I = first; I < last; ++I)
   {
-    const float t = value[2 * I] * unit * static_cast<float>(kept[2 * I]);
-    const float u = t * unit * static_cast<float>(wx[2 * I]);
-    const float b = unit * static_cast<float>(wy[2 * I]);
-    const float c = unit * static_cast<float>(wz[2 * I]);
+    const float t = value[2 * I] * unit * static_cast<float>(kept[I]);
+    const float u = t * unit * static_cast<float>(wx[I]);
+    const float b = unit * static_cast<float>(wy[I]);
+    const float c = unit * static_cast<float>(wz[I]);
     const float f3 = b * c;
     const float f2 = c - f3;
     const float f1 = b - f3;
@@ -556,13 +597,14 @@ void addTwo(int n, const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRA
 
 /** x[2 I + odd] += kept times the tensor product of the three weights on eight coarse values. */
 LIGHTTRANSPORT_SIMD
-void prolongRow(int first, int last, const MultigridLine& v, const float* const* coarse, float* sum)
+void prolongRow(int first, int last, const MultigridLine& v, const float* const* coarse,
+  float* LIGHTTRANSPORT_RESTRICT to)
 {
   constexpr float unit = 1.f / 255.f;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx = v.wx + v.odd;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy = v.wy + v.odd;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz = v.wz + v.odd;
-  const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept = v.kept + v.odd;
+  const std::uint8_t* wx = v.wx;
+  const std::uint8_t* wy = v.wy;
+  const std::uint8_t* wz = v.wz;
+  const std::uint8_t* kept = v.kept;
   const int side = v.odd ? 1 : -1;
   const float* u0 = coarse[0];
   const float* u1 = coarse[1];
@@ -572,19 +614,18 @@ void prolongRow(int first, int last, const MultigridLine& v, const float* const*
   const float* s1 = u1 + side;
   const float* s2 = u2 + side;
   const float* s3 = u3 + side;
-  float* LIGHTTRANSPORT_RESTRICT to = sum;
   for (int I = first; I < last; ++I)
   {
-    const float a = unit * static_cast<float>(wx[2 * I]);
-    const float b = unit * static_cast<float>(wy[2 * I]);
-    const float c = unit * static_cast<float>(wz[2 * I]);
+    const float a = unit * static_cast<float>(wx[I]);
+    const float b = unit * static_cast<float>(wy[I]);
+    const float c = unit * static_cast<float>(wz[I]);
     const float v0 = u0[I] + a * (s0[I] - u0[I]);
     const float v1 = u1[I] + a * (s1[I] - u1[I]);
     const float v2 = u2[I] + a * (s2[I] - u2[I]);
     const float v3 = u3[I] + a * (s3[I] - u3[I]);
     const float y0 = v0 + b * (v1 - v0);
     const float y1 = v2 + b * (v3 - v2);
-    to[I] = unit * static_cast<float>(kept[2 * I]) * (y0 + c * (y1 - y0));
+    to[I] = unit * static_cast<float>(kept[I]) * (y0 + c * (y1 - y0));
   }
 }
 
@@ -613,6 +654,12 @@ float* scratch(std::size_t rows, std::size_t length, std::size_t& pitch)
   }
   return store.data() + 16;
 }
+/** From row to row of what is kept of the red voxels alone. */
+std::int64_t redPitch(const DiffusionOperator& A)
+{
+  return (A.dims[0] + 1) / 2;
+}
+
 /** (i + j + k + colour) & 1 of the first value of a row's span. */
 int parityOf(const DiffusionOperator& A, std::int64_t row, std::int64_t begin, int colour)
 {
@@ -921,8 +968,6 @@ void DivideByDiagonal(
 void Multigrid::release()
 {
   this->levels.clear();
-  this->first.release();
-  this->firstImage.release();
   this->finest = nullptr;
 }
 
@@ -933,16 +978,17 @@ std::int64_t Multigrid::bytes() const
   {
     // what the domain touches of each: the rest of the memory stays with the system
     const DiffusionOperator& A = &level == &this->levels.front() ? *this->finest : level.A;
-    const std::int64_t perVoxel = (level.x.empty() ? 0 : 8) + (level.kept.empty() ? 0 : 1) +
-      static_cast<std::int64_t>(!level.w[0].empty()) + !level.w[1].empty() + !level.w[2].empty();
-    sum += level.A.bytes() + A.activeSize * perVoxel;
+    const std::int64_t weights = static_cast<std::int64_t>(!level.kept.empty()) +
+      !level.w[0].empty() + !level.w[1].empty() + !level.w[2].empty();
+    const int vectors = (level.x.empty() ? 0 : 2) + (level.first.empty() ? 0 : 2);
+    sum += level.A.bytes() + A.activeSize * (8 * vectors + weights) / 2;
   }
-  sum += this->levels.size() > 2 ? 8 * this->levels[1].A.activeSize : 0;
   return sum;
 }
 
 //------------------------------------------------------------------------------
-void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor)
+void Multigrid::setup(
+  const DiffusionOperator& A, const MultigridWork& work, const ParallelFor& parallelFor)
 {
   this->release();
   this->finest = &A;
@@ -977,32 +1023,34 @@ void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor
     }
     this->levels.emplace_back();
     Level& coarse = this->levels.back();
-    this->coarsen(*fine, this->levels[this->levels.size() - 2], coarse, parallelFor);
+    this->coarsen(*fine, this->levels[this->levels.size() - 2], coarse, work, parallelFor);
     fine = &coarse.A;
   }
-  if (this->levels.size() > 2)
+  for (std::size_t l = 1; l <= AcceleratedLevels && l + 1 < this->levels.size(); ++l)
   {
-    this->first.allocate(this->levels[1].A.size(), A.pages);
-    this->firstImage.allocate(this->levels[1].A.size(), A.pages);
+    Level& level = this->levels[l];
+    level.first.allocate(level.A.size(), A.pages);
+    level.firstImage.allocate(level.A.size(), A.pages);
   }
 }
 
 //------------------------------------------------------------------------------
-void Multigrid::coarsen(
-  const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const
+void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
+  const MultigridWork& work, const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
   std::array<int, 3> nc;
+  const std::int64_t redSize = redPitch(A) * n[1] * n[2];
   for (int d = 0; d < 3; ++d)
   {
     nc[d] = fine.halved[d] ? (n[d] + 1) / 2 : n[d];
     if (fine.halved[d])
     {
-      fine.w[d].allocate(A.size(), A.pages);
+      fine.w[d].allocate(redSize, A.pages);
     }
   }
   fine.noWeight.allocate(n[0]);
-  fine.kept.allocate(A.size(), A.pages);
+  fine.kept.allocate(redSize, A.pages);
   coarse.A.allocate(nc, A.pages);
   coarse.x.allocate(coarse.A.size(), A.pages);
   coarse.b.allocate(coarse.A.size(), A.pages);
@@ -1020,113 +1068,128 @@ void Multigrid::coarsen(
     }
     coarse.A.restrictTo(std::move(spans));
   }
-  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
 
-  // 3. the weights, from the lines through the coarse faces
-  const auto forLines = [&](int d)
-  {
-    ForEachRow(A, parallelFor,
-      [&](std::int64_t row, std::int64_t o, int length)
-      {
-        if (d == 0)
-        {
-          // faces after the odd voxels; the last voxel of an odd row is its own centre
-          const std::int64_t begin = row * n[0];
-          const int first = static_cast<int>(o - begin) | 1;
-          const int last = std::min(static_cast<int>(o - begin) + length, n[0] - 1);
-          const float* g = A.g[0].data() + begin;
-          lineRow(first, last, 2, n[0] - 2, g, g - 1, g + 1, fine.w[0].data() + begin,
-            fine.w[0].data() + begin + 1);
-          return;
-        }
-        const int at = d == 1 ? static_cast<int>(row % n[1]) : static_cast<int>(row / n[1]);
-        if (at % 2 == 1 && at + 1 < n[d])
-        {
-          const float* g = A.g[d].data() + o;
-          const float* above = at + 2 < n[d] ? g + stride[d] : nullptr;
-          lineRow(0, length, 1, length, g, g - stride[d], above, fine.w[d].data() + o,
-            fine.w[d].data() + o + stride[d]);
-        }
-      });
-  };
-  for (int d = 0; d < 3; ++d)
-  {
-    if (fine.halved[d])
+  // 3. the weights, from the lines through the coarse faces, and what is felt of the sinks
+  const LineWeights all{ reinterpret_cast<std::uint8_t*>(work.first), work.second };
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t o, int length)
     {
-      forLines(d);
-    }
-  }
+      this->weighRow(A, fine, row, all);
+      const int begin = static_cast<int>(o - row * n[0]);
+      const int odd = static_cast<int>((row % n[1] + row / n[1]) & 1);
+      const int first = (begin - odd + 1) / 2;
+      const int last = (begin + length - odd + 1) / 2;
+      for (int d = 0; d < 3; ++d)
+      {
+        if (fine.halved[d])
+        {
+          packRow(first, last, odd, all.row(A, row, d), fine.w[d].data() + row * redPitch(A));
+        }
+      }
+      packRow(first, last, odd, all.row(A, row, 3), fine.kept.data() + row * redPitch(A));
+    });
   // 2. faces go to the coarse columns that their voxels are put between
   for (int d = 0; d < 3; ++d)
   {
     if (fine.halved[d])
     {
-      this->gatherFaces(A, fine, coarse.A, d, coarse.A.g[d].data(), parallelFor);
+      this->gatherFaces(A, fine, all, coarse.A, d, coarse.A.g[d].data(), parallelFor);
     }
     else
     {
-      gather(A, fine, coarse.A, A.g[d].data(), nullptr, d, coarse.A.g[d].data(), parallelFor);
+      this->gather(A, fine, all, coarse.A, A.g[d].data(), d, coarse.A.g[d].data(), parallelFor);
     }
   }
-  Buffer<float> felt(A.size(), A.pages);
-  // A sink pulls its own voxel down, and the parents only as far as the voxel is tied to them:
-  // the balance of flux there has the sink beside the lines.
-  ForEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int length)
-    {
-      static thread_local std::vector<float> store;
-      store.assign(static_cast<std::size_t>(n[0]), 0.f);
-      const int begin = static_cast<int>(o - row * n[0]);
-      const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-      float* tie = store.data() + begin;
-      for (int d = 0; d < 3; ++d)
-      {
-        if (!fine.halved[d])
-        {
-          continue;
-        }
-        const float* g = A.g[d].data() + o;
-        if (d > 0)
-        {
-          const bool odd = at[d] % 2 == 1;
-          const std::int64_t t = stride[d];
-          const float* inner = odd ? g - t : at[d] + 1 < n[d] ? g : nullptr;
-          const float* between = odd ? (at[d] + 1 < n[d] ? g : nullptr)
-            : at[d] > 0              ? g - t
-                                     : nullptr;
-          const float* beyond = odd ? (at[d] + 2 < n[d] ? g + t : nullptr)
-            : at[d] > 1             ? g - 2 * t
-                                    : nullptr;
-          tieRow(0, length, 1, inner, between, beyond, tie);
-          continue;
-        }
-        const int lone = n[0] % 2 == 1 ? n[0] - 1 : n[0]; // its own centre
-        const float* whole = A.g[0].data() + row * n[0];
-        float* all = store.data();
-        // odd voxels, then even ones; faces outside the row are 0
-        tieRow(begin | 1, std::min(begin + length, n[0] - 2), 2, whole - 1, whole, whole + 1, all);
-        for (int i = std::max(begin | 1, n[0] - 2 + (n[0] % 2 == 0 ? 0 : 1)); i < begin + length;
-             i += 2)
-        {
-          tieRow(i, i + 1, 2, whole - 1, i + 1 < n[0] ? whole : nullptr, nullptr, all);
-        }
-        if (begin == 0)
-        {
-          tieRow(0, 1, 2, lone == 0 ? nullptr : whole, nullptr, nullptr, all);
-        }
-        const int first = std::max(begin + (begin & 1), 2);
-        tieRow(first, std::min(begin + length, lone), 2, whole, whole - 1, whole - 2, all);
-        if (lone >= first && lone < begin + length)
-        {
-          tieRow(lone, lone + 1, 2, nullptr, whole - 1, whole - 2, all);
-        }
-      }
-      keepRow(length, tie, A.s.data() + o, fine.kept.data() + o, felt.data() + o);
-    });
-  gather(A, fine, coarse.A, felt.data(), nullptr, -1, coarse.A.s.data(), parallelFor);
-  this->raise(A, fine, coarse.A, parallelFor);
+  this->gather(A, fine, all, coarse.A, all.felt, -1, coarse.A.s.data(), parallelFor);
+  this->raise(A, fine, all, coarse.A, parallelFor);
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
+}
+
+void Multigrid::weighRow(
+  const DiffusionOperator& A, const Level& fine, std::int64_t row, const LineWeights& all) const
+{
+  const std::array<int, 3>& n = A.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  const Span span = A.span(row);
+  const int begin = span.begin;
+  const int length = span.end - span.begin;
+  const std::int64_t o = row * n[0] + begin;
+  const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+  for (int d = 0; d < 3; ++d)
+  {
+    if (!fine.halved[d])
+    {
+      continue;
+    }
+    std::uint8_t* w = all.row(A, row, d);
+    const float* g = A.g[d].data() + o;
+    const std::int64_t t = stride[d];
+    if (d > 0 && at[d] % 2 == 1 && at[d] + 1 < n[d])
+    {
+      lineAcross(length, g, g - t, at[d] + 2 < n[d] ? g + t : nullptr, false, w + begin);
+    }
+    else if (d > 0 && at[d] % 2 == 0 && at[d] > 0)
+    {
+      lineAcross(length, g - t, g - 2 * t, at[d] + 1 < n[d] ? g : nullptr, true, w + begin);
+    }
+    else
+    {
+      std::fill(w + begin, w + begin + length, std::uint8_t(0));
+    }
+    if (d == 0)
+    {
+      // faces after the odd voxels; the last voxel of an odd row is its own centre
+      lineAlong(
+        begin | 1, std::min(begin + length, n[0] - 1), n[0] - 2, A.g[0].data() + row * n[0], w);
+    }
+  }
+  // A sink pulls its own voxel down, and the parents only as far as the voxel is tied to them:
+  // the balance of flux there has the sink beside the lines.
+  static thread_local std::vector<float> store;
+  store.assign(static_cast<std::size_t>(n[0]), 0.f);
+  float* tie = store.data() + begin;
+  for (int d = 0; d < 3; ++d)
+  {
+    if (!fine.halved[d])
+    {
+      continue;
+    }
+    const float* g = A.g[d].data() + o;
+    if (d > 0)
+    {
+      const bool odd = at[d] % 2 == 1;
+      const std::int64_t t = stride[d];
+      const float* inner = odd ? g - t : at[d] + 1 < n[d] ? g : nullptr;
+      const float* between = odd ? (at[d] + 1 < n[d] ? g : nullptr) : at[d] > 0 ? g - t : nullptr;
+      const float* beyond = odd ? (at[d] + 2 < n[d] ? g + t : nullptr)
+        : at[d] > 1             ? g - 2 * t
+                                : nullptr;
+      tieRow(0, length, 1, inner, between, beyond, tie);
+      continue;
+    }
+    const int lone = n[0] % 2 == 1 ? n[0] - 1 : n[0]; // its own centre
+    const float* whole = A.g[0].data() + row * n[0];
+    float* ties = store.data();
+    // odd voxels, then even ones; faces outside the row are 0
+    tieRow(begin | 1, std::min(begin + length, n[0] - 2), 2, whole - 1, whole, whole + 1, ties);
+    for (int i = std::max(begin | 1, n[0] - 2 + (n[0] % 2 == 0 ? 0 : 1)); i < begin + length;
+         i += 2)
+    {
+      tieRow(i, i + 1, 2, whole - 1, i + 1 < n[0] ? whole : nullptr, nullptr, ties);
+    }
+    if (begin == 0)
+    {
+      tieRow(0, 1, 2, lone == 0 ? nullptr : whole, nullptr, nullptr, ties);
+    }
+    const int first = std::max(begin + (begin & 1), 2);
+    tieRow(first, std::min(begin + length, lone), 2, whole, whole - 1, whole - 2, ties);
+    if (lone >= first && lone < begin + length)
+    {
+      tieRow(lone, lone + 1, 2, nullptr, whole - 1, whole - 2, ties);
+    }
+  }
+  keepRow(length, tie, A.s.data() + o, all.row(A, row, 3) + begin, all.felt + o);
 }
 
 Multigrid::Footprint Multigrid::footprint(
@@ -1143,16 +1206,20 @@ Multigrid::Footprint Multigrid::footprint(
   return rows;
 }
 
-void Multigrid::weigh(const Level& fine, const int at[3], const int J[3], std::int64_t f, int along,
-  std::int64_t other, Weights weights[3]) const
+void Multigrid::weigh(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+  const int at[3], const int J[3], int along, bool ends, Weights weights[3]) const
 {
+  const std::int64_t row = at[1] + static_cast<std::int64_t>(A.dims[1]) * at[2];
+  const int next[3] = { 0, along == 1 && ends ? 1 : 0, along == 2 && ends ? 1 : 0 };
+  const std::int64_t other = row + next[1] + static_cast<std::int64_t>(A.dims[1]) * next[2];
+  const int step = along == 0 && ends ? 1 : 0;
   for (int d = 0; d < 3; ++d)
   {
     if (fine.halved[d] && d != along)
     {
-      const std::uint8_t* w = fine.w[d].data() + f;
       const bool parent = d == 0 || at[d] / 2 == J[d];
-      weights[d] = { w, w + other, parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
+      weights[d] = { all.row(A, row, d) + at[0], all.row(A, other, d) + at[0] + step,
+        parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
     }
     else
     {
@@ -1161,8 +1228,8 @@ void Multigrid::weigh(const Level& fine, const int at[3], const int J[3], std::i
   }
 }
 
-void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
-  const float* v, const std::uint8_t* kept, int along, float* out,
+void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+  const DiffusionOperator& C, const float* v, int along, float* out,
   const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
@@ -1188,26 +1255,22 @@ void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Diff
             continue;
           }
           const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
-          const int at[3] = { 0, j, k };
+          const int at[3] = { span.begin, j, k };
           // a face's weights are the mean of those at its two ends
-          const bool ends = along >= 0 && at[along] + 1 < n[along];
+          const bool ends = along == 0 || (along > 0 && at[along] + 1 < n[along]);
           Weights weights[3];
-          this->weigh(fine, at, J, f, along, ends ? stride[along] : 0, weights);
-          gatherRow(span.end - span.begin, v + f, kept ? kept + f : nullptr, weights[0], weights[1],
-            weights[2], own + span.begin, next + span.begin);
+          this->weigh(A, fine, all, at, J, along, ends, weights);
+          gatherRow(span.end - span.begin, v + f, weights[0], weights[1], weights[2],
+            own + span.begin, next + span.begin);
         }
       }
       const int begin = static_cast<int>(o - row * nc[0]);
-      for (int i = begin; i < begin + length; ++i)
-      {
-        out[row * nc[0] + i] =
-          fine.halved[0] ? own[2 * i] + own[2 * i + 1] + next[2 * i - 1] + next[2 * i + 2] : own[i];
-      }
+      columnRow(begin, begin + length, fine.halved[0], own, next, out + row * nc[0]);
     });
 }
 
-void Multigrid::raise(const DiffusionOperator& A, const Level& fine, DiffusionOperator& C,
-  const ParallelFor& parallelFor) const
+void Multigrid::raise(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+  DiffusionOperator& C, const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = C.dims;
@@ -1247,13 +1310,13 @@ void Multigrid::raise(const DiffusionOperator& A, const Level& fine, DiffusionOp
           }
           if (span.begin < span.end)
           {
-            const std::int64_t f = span.begin + static_cast<std::int64_t>(n[0]) * j + plane * k;
-            const int at[3] = { 0, j, k };
+            const int at[3] = { span.begin, j, k };
             Weights w[3];
-            this->weigh(fine, at, J, f, -1, 0, w);
+            this->weigh(A, fine, all, at, J, -1, false, w);
             const int jj = j - rows.first[1] + 1;
             const int kk = k - rows.first[2] + 1;
-            weightRow(span.end - span.begin, fine.kept.data() + f, w[0], w[1], w[2],
+            const std::int64_t fineRow = j + static_cast<std::int64_t>(n[1]) * k;
+            weightRow(span.end - span.begin, all.row(A, fineRow, 3) + span.begin, w[0], w[1], w[2],
               weights(jj, kk, 0) + span.begin, weights(jj, kk, 1) + span.begin);
           }
         }
@@ -1288,12 +1351,14 @@ void Multigrid::raise(const DiffusionOperator& A, const Level& fine, DiffusionOp
           }
         }
       }
-      raiseRow(static_cast<int>(o - row * nc[0]), static_cast<int>(o - row * nc[0]) + length,
-        fine.halved[0], LeastPart, own, next, facesOfRow(C, row, o), C.s.data() + o);
+      const int begin = static_cast<int>(o - row * nc[0]);
+      float* energy = zeros;
+      columnRow(begin, begin + length, fine.halved[0], own, next, energy);
+      raiseRow(length, LeastPart, energy + begin, facesOfRow(C, row, o), C.s.data() + o);
     });
 }
 
-void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
+void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
   const DiffusionOperator& C, int along, float* out, const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
@@ -1316,14 +1381,14 @@ void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
         for (int j = rows.first[1]; j <= rows.last[1]; ++j)
         {
           const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
-          const int at[3] = { 0, j, k };
+          const int at[3] = { span.begin, j, k };
           if (span.begin >= span.end || (along > 0 && at[along] + 1 >= n[along]))
           {
             continue;
           }
           const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
           Weights weights[3];
-          this->weigh(fine, at, J, f, along, stride[along], weights);
+          this->weigh(A, fine, all, at, J, along, true, weights);
           const float* g = A.g[along].data() + f;
           const float* between = g;
           const float* below = g - stride[along];
@@ -1331,7 +1396,12 @@ void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
           const int count = span.end - span.begin;
           if (along == 0)
           {
-            maskFacesRow(count, span.begin, n[0], noResistance, g, room, masked);
+            maskFacesRow(count, span.begin, n[0], g, masked, masked + room, masked + 2 * room);
+            const int last = n[0] - 2 - span.begin; // its voxel above is its own centre
+            if (last >= 0 && last < count && n[0] % 2 == 1)
+            {
+              masked[2 * room + static_cast<std::size_t>(last)] = noResistance;
+            }
             between = masked;
             below = masked + room;
             above = masked + 2 * room;
@@ -1348,18 +1418,26 @@ void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine,
       // the lines of a coarse face mix between the faces: sums in series (an upper bound, which
       // keeps bent corridors open; straight lines in parallel would be a lower one)
       const int begin = static_cast<int>(o - row * nc[0]);
-      seriesRow(begin, begin + length, fine.halved[0], own, next, room, out + row * nc[0]);
+      for (std::size_t part = 0; part < 3; ++part)
+      {
+        columnRow(begin, begin + length, fine.halved[0], own + part * room, next + part * room,
+          masked + part * room);
+      }
+      const float* sums = masked + begin;
+      seriesRow(length, sums, sums + room, sums + 2 * room, out + o);
     });
 }
 
-MultigridLine Multigrid::lineOf(const Level& fine, const int at[3], std::int64_t begin) const
+MultigridLine Multigrid::lineOf(
+  const DiffusionOperator& A, const Level& fine, const int at[3], std::int64_t row) const
 {
   const std::uint8_t* w[3];
   for (int d = 0; d < 3; ++d)
   {
-    w[d] = fine.halved[d] ? fine.w[d].data() + begin : fine.noWeight.data();
+    w[d] = fine.halved[d] ? fine.w[d].data() + row * redPitch(A) : fine.noWeight.data();
   }
-  return { w[0], w[1], w[2], fine.kept.data() + begin, fine.halved[0], (at[1] + at[2]) & 1 };
+  return { w[0], w[1], w[2], fine.kept.data() + row * redPitch(A), fine.halved[0],
+    (at[1] + at[2]) & 1 };
 }
 void CloseIsolated(DiffusionOperator& A, float isolated, const ParallelFor& parallelFor)
 {
@@ -1409,9 +1487,8 @@ void Multigrid::restrictRow(const DiffusionOperator& A, const Level& fine, Level
   const std::array<int, 3>& n = A.dims;
   const DiffusionOperator& C = coarse.A;
   const Span span = A.span(row);
-  const std::int64_t begin = row * n[0];
   const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-  const MultigridLine line = this->lineOf(fine, at, begin);
+  const MultigridLine line = this->lineOf(A, fine, at, row);
   const Between rows = between(C.dims, fine.halved, at);
   float* bc = coarse.b.data();
   if (!line.halved)
@@ -1427,9 +1504,9 @@ void Multigrid::restrictRow(const DiffusionOperator& A, const Level& fine, Level
       float* to = bc + rows.row[m] * C.dims[0];
       for (int i = span.begin + ((span.begin + line.odd) & 1); i < span.end; i += 2)
       {
-        const float wy = unit * static_cast<float>(line.wy[i]);
-        const float wz = unit * static_cast<float>(line.wz[i]);
-        to[i] += r[i] * unit * static_cast<float>(line.kept[i]) * ((m & 1) ? wy : 1.f - wy) *
+        const float wy = unit * static_cast<float>(line.wy[i >> 1]);
+        const float wz = unit * static_cast<float>(line.wz[i >> 1]);
+        to[i] += r[i] * unit * static_cast<float>(line.kept[i >> 1]) * ((m & 1) ? wy : 1.f - wy) *
           ((m >> 1) ? wz : 1.f - wz);
       }
     }
@@ -1449,7 +1526,8 @@ void Multigrid::restrictRow(const DiffusionOperator& A, const Level& fine, Level
   {
     return;
   }
-  depositRow(first, last, line, r, own, next);
+  depositRow(
+    first, last, line, r, own[0], own[1], own[2], own[3], next[0], next[1], next[2], next[3]);
   const int from = std::max(first - 1, 0);
   const int to = std::min(last + 1, C.dims[0]);
   for (int m = 0; m < 4; ++m)
@@ -1475,7 +1553,7 @@ void Multigrid::prolongRow(const DiffusionOperator& A, const Level& fine, const 
   const Span span = A.span(row);
   const std::int64_t begin = row * n[0];
   const int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-  const MultigridLine line = this->lineOf(fine, at, begin);
+  const MultigridLine line = this->lineOf(A, fine, at, row);
   const Between rows = between(C.dims, fine.halved, at);
   const float* e[4];
   for (int m = 0; m < 4; ++m)
@@ -1488,11 +1566,11 @@ void Multigrid::prolongRow(const DiffusionOperator& A, const Level& fine, const 
     constexpr float unit = 1.f / 255.f;
     for (int i = span.begin + ((span.begin + line.odd) & 1); i < span.end; i += 2)
     {
-      const float b = unit * static_cast<float>(line.wy[i]);
-      const float c = unit * static_cast<float>(line.wz[i]);
+      const float b = unit * static_cast<float>(line.wy[i >> 1]);
+      const float c = unit * static_cast<float>(line.wz[i >> 1]);
       const float y0 = e[0][i] + b * (e[1][i] - e[0][i]);
       const float y1 = e[2][i] + b * (e[3][i] - e[2][i]);
-      to[i] += unit * static_cast<float>(line.kept[i]) * (y0 + c * (y1 - y0));
+      to[i] += unit * static_cast<float>(line.kept[i >> 1]) * (y0 + c * (y1 - y0));
     }
     return;
   }
@@ -1595,14 +1673,14 @@ void Multigrid::solveCoarse(std::size_t l, const ParallelFor& parallelFor)
   const DiffusionOperator& C = level.A;
   float* b = level.b.data();
   float* x = level.x.data();
-  if (l > 1 || l + 1 >= this->levels.size())
+  if (level.first.empty())
   {
     this->cycle(l, b, x, parallelFor, nullptr);
     return;
   }
   // 5. two steps of conjugate gradients: c1 x1 + c2 x2 is the best there in A's norm
-  float* x1 = this->first.data();
-  float* v1 = this->firstImage.data();
+  float* x1 = level.first.data();
+  float* v1 = level.firstImage.data();
   double xb = 0.;
   this->cycle(l, b, x1, parallelFor, nullptr);
   double a11 = 0.;
@@ -1614,7 +1692,7 @@ void Multigrid::solveCoarse(std::size_t l, const ParallelFor& parallelFor)
   const double t = a11 > 0. ? xb / a11 : 0.;
   if (!(t > 0.) || !std::isfinite(t))
   {
-    std::swap(this->first, level.x);
+    std::swap(level.first, level.x);
     return;
   }
   ForEachRow(C, parallelFor,

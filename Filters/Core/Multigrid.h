@@ -29,8 +29,8 @@
  *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after the
  *      coarse correction, twice each. After a red-black sweep only red voxels have a
  *      residual, and only they need a correction.
- *   5. The second grid takes two steps of conjugate gradients around its own cycle (Notay
- *      and Vassilevski 2008, a K-cycle), so that what a coarse operator over- or
+ *   5. The second and the third grid take two steps of conjugate gradients around their own
+ *      cycle (Notay and Vassilevski 2008, a K-cycle), so that what a coarse operator over- or
  *      underestimates is scaled right. The cycle is then not quite linear: whoever uses
  *      it as a preconditioner takes a flexible method.
  *
@@ -151,20 +151,31 @@ struct MultigridWeights
   float factor, slope;
 };
 
-/** A row's weights along the lines. */
+/** The weights along the lines of a row's red voxels x = 2 I + odd, at I. */
 struct MultigridLine
 {
   const std::uint8_t *wx, *wy, *wz, *kept;
-  /** Along x: is it halved? Then voxel x = 2 I + odd lies between I and I + (odd ? 1 : -1). */
+  /** Along x: is it halved? Then voxel x lies between I and I + (odd ? 1 : -1). */
   bool halved;
-  int odd; ///< the red voxels of the row are those with x + odd even
+  int odd;
+};
+
+/**
+ * Two vectors of the finest grid that Multigrid::setup spoils, on the rows of the domain: what
+ * only it needs lies there.
+ */
+struct MultigridWork
+{
+  float *first, *second;
 };
 
 class Multigrid
 {
 public:
-  /** Builds the hierarchy for A, which must outlive it and be stored for as long as this takes. */
-  void setup(const DiffusionOperator& A, const ParallelFor& parallelFor);
+  /**
+   * Builds the hierarchy for A, which must outlive it and be stored for as long as this takes.
+   */
+  void setup(const DiffusionOperator& A, const MultigridWork& work, const ParallelFor& parallelFor);
   void release();
 
   /**
@@ -183,13 +194,29 @@ public:
 private:
   struct Level
   {
-    DiffusionOperator A; // empty on the finest, which is the caller's
-    Buffer<float> x, b;  // empty on the finest: the caller's
+    DiffusionOperator A;             // empty on the finest, which is the caller's
+    Buffer<float> x, b;              // empty on the finest: the caller's
+    Buffer<float> first, firstImage; // see solveCoarse; empty where one cycle is enough
     std::array<bool, 3> halved{ { false, false, false } };
+    // Of the red voxels alone, which are all that a cycle puts between coarse ones: voxel
+    // x = 2 I + odd of a row is its value I.
     std::array<Buffer<std::uint8_t>, 3> w; // weight of the parent's neighbour, /255
     Buffer<std::uint8_t>
       kept; // of what comes in along the lines, the part that no sink takes, /255
     Buffer<std::uint8_t> noWeight; // a row of 0, along axes that are not halved
+  };
+  /**
+   * The same of all voxels, and what is felt of their sinks, while a level is set up. A row's
+   * weights, of the three axes and kept, follow each other.
+   */
+  struct LineWeights
+  {
+    std::uint8_t* rows;
+    float* felt;
+    std::uint8_t* row(const DiffusionOperator& A, std::int64_t r, int which) const
+    {
+      return this->rows + (4 * r + which) * A.dims[0];
+    }
   };
   void cycle(
     std::size_t l, const float* b, float* x, const ParallelFor& parallelFor, const RowBody& done);
@@ -199,8 +226,11 @@ private:
   {
     return l == 0 ? *this->finest : this->levels[l].A;
   }
-  void coarsen(
-    const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const;
+  void coarsen(const DiffusionOperator& A, Level& fine, Level& coarse, const MultigridWork& work,
+    const ParallelFor& parallelFor) const;
+  /** A row's weights, of all its voxels. */
+  void weighRow(
+    const DiffusionOperator& A, const Level& fine, std::int64_t row, const LineWeights& all) const;
 
   using Weights = MultigridWeights;
   /** The fine rows, along y and z, that have to do with a coarse one. */
@@ -210,22 +240,24 @@ private:
   };
   Footprint footprint(
     const Level& fine, const std::array<int, 3>& n, const int J[3], int along) const;
-  void weigh(const Level& fine, const int at[3], const int J[3], std::int64_t f, int along,
-    std::int64_t other, Weights weights[3]) const;
+  /** Of the values from `at` on; where `ends`, with those at the other end of a face `along`. */
+  void weigh(const DiffusionOperator& A, const Level& fine, const LineWeights& all, const int at[3],
+    const int J[3], int along, bool ends, Weights weights[3]) const;
   /**
-   * out_C = sum over voxels f of P_fC v_f (kept is P's part for the sinks). `along` >= 0: v
+   * out_C = sum over voxels f of P_fC v_f, without P's part for the sinks. `along` >= 0: v
    * stands on the faces along that axis, which is not halved.
    */
-  void gather(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
-    const float* v, const std::uint8_t* kept, int along, float* out,
+  void gather(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+    const DiffusionOperator& C, const float* v, int along, float* out,
     const ParallelFor& parallelFor) const;
   /** Raises coarse sinks where the diagonal is far below that of P^T A P, see 3. above. */
-  void raise(const DiffusionOperator& A, const Level& fine, DiffusionOperator& C,
-    const ParallelFor& parallelFor) const;
+  void raise(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+    DiffusionOperator& C, const ParallelFor& parallelFor) const;
   /** The coarse faces along an axis that is halved, see 2. above. */
-  void gatherFaces(const DiffusionOperator& A, const Level& fine, const DiffusionOperator& C,
-    int along, float* out, const ParallelFor& parallelFor) const;
-  MultigridLine lineOf(const Level& fine, const int at[3], std::int64_t begin) const;
+  void gatherFaces(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+    const DiffusionOperator& C, int along, float* out, const ParallelFor& parallelFor) const;
+  MultigridLine lineOf(
+    const DiffusionOperator& A, const Level& fine, const int at[3], std::int64_t row) const;
   /**
    * coarse.b += P^T r on the row's red voxels (black ones have no residual). r is a row of the
    * box, and the first of nine with that pitch, the others for work.
@@ -238,7 +270,6 @@ private:
 
   const DiffusionOperator* finest = nullptr;
   std::deque<Level> levels;
-  Buffer<float> first, firstImage; // of level 1, see solveCoarse
 };
 } // namespace lighttransport
 
