@@ -4,8 +4,8 @@
  * The diffusion solver against its floor and its competitors, all in one run and
  * in turn, so that their quotients mean something on a busy machine.
  *
- *   bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256] [--threads 1,2]
- *     [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]
+ *   bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256] [--media 1,2,3]
+ *     [--threads 1,2] [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]
  *     [--error-size 128] [--large] [--quick]
  *
  * Prints tables of Markdown and leaves the same numbers as CSV in FOLDER:
@@ -51,6 +51,7 @@ struct Options
 {
   std::string output = "bench-diffusion";
   std::vector<int> sizes{ 32, 64, 96, 128, 256 };
+  std::vector<int> media{ 1, 2, 3 };
   std::vector<int> threads{ 1, 2 };
   std::vector<int> stepSizes{ 128, 256, 512 };
   std::vector<int> floorSizes{ 128, 256 };
@@ -59,7 +60,7 @@ struct Options
   int errorSize = 128;
   double tolerance = 1e-6;
   std::int64_t triadLength = 32 << 20;
-  int largestHypre = 256;
+  int largestHypre = 384;
   bool quick = false;
   std::string folderOfProgram;
 
@@ -179,6 +180,46 @@ private:
 };
 
 //------------------------------------------------------------------------------
+/** Memory that is freed stays with the process while one lives. */
+class KeepHeap
+{
+public:
+#if defined(__GLIBC__)
+  KeepHeap()
+  {
+    mallopt(M_MMAP_MAX, 0);
+    mallopt(M_TRIM_THRESHOLD, -1); // never
+  }
+  ~KeepHeap()
+  {
+    mallopt(M_MMAP_MAX, 65536);
+    mallopt(M_TRIM_THRESHOLD, 128 * 1024);
+    malloc_trim(0);
+  }
+#else
+  KeepHeap() = default;
+#endif
+  KeepHeap(const KeepHeap&) = delete;
+  KeepHeap& operator=(const KeepHeap&) = delete;
+};
+
+/**
+ * Keeps all threads busy for a while, so that the system has spread them over the cores when a
+ * measurement begins: hypre's ranks have just filled their matrices then.
+ */
+void WakeThreads(int threads)
+{
+  const ParallelFor parallelFor = OnThreads(threads);
+  const double end = now() + 0.2;
+  parallelFor(threads,
+    [end](std::int64_t, std::int64_t)
+    {
+      while (now() < end)
+      {
+      }
+    });
+}
+
 /** This project's solver from D and sigma_a to phi: all of it counts. */
 Run SolveOurs(const Problem& problem, double tolerance, int threads, std::vector<double>& phi,
   bool iterate = false)
@@ -186,8 +227,10 @@ Run SolveOurs(const Problem& problem, double tolerance, int threads, std::vector
   Run run;
   phi.assign(problem.q.size(), 0.);
   const std::vector<std::uint8_t> nothing(iterate ? problem.q.size() : 0, 0);
+  const ParallelFor parallelFor = OnThreads(threads);
+  const double cpuBegan = CpuSeconds();
   const double began = now();
-  DiffusionSolver solver(OnThreads(threads));
+  DiffusionSolver solver(parallelFor);
   DiffusionMedium<float> described = problem.medium();
   described.outside = iterate ? nothing.data() : nullptr; // then no medium is taken for constant
   const DiffusionReport medium = solver.setMedium(described);
@@ -196,6 +239,7 @@ Run SolveOurs(const Problem& problem, double tolerance, int threads, std::vector
   control.tolerance = tolerance;
   const DiffusionReport report = solver.solveSteady(problem.q.data(), phi.data(), control);
   run.solve = now() - began - run.setup;
+  run.cpu = CpuSeconds() - cpuBegan;
   run.iterations = report.iterations;
   run.applications = report.fineApplications;
   run.bytes = static_cast<double>(std::max(medium.bytes, report.bytes));
@@ -203,6 +247,17 @@ Run SolveOurs(const Problem& problem, double tolerance, int threads, std::vector
   {
     run.failure = ToString(report.reason);
   }
+  return run;
+}
+
+/** First in fresh memory, then in a heap where another solve has left its memory. */
+Run SolveOursTwice(const Problem& problem, double tolerance, int threads, std::vector<double>& phi)
+{
+  WakeThreads(threads);
+  Run run = SolveOurs(problem, tolerance, threads, phi);
+  const KeepHeap keep;
+  SolveOurs(problem, tolerance, threads, phi);
+  run.again = SolveOurs(problem, tolerance, threads, phi).seconds();
   return run;
 }
 
@@ -253,8 +308,8 @@ public:
     FILE* pipe = popen(command.str().c_str(), "r");
     char line[256] = "";
     if (!pipe || !std::fgets(line, sizeof line, pipe) ||
-      std::sscanf(line, "%lf %lf %lf %d %lf %lf", &run.assemble, &run.setup, &run.solve,
-        &run.iterations, &run.bytes, &run.cpu) != 6)
+      std::sscanf(line, "%lf %lf %lf %d %lf %lf %lf", &run.assemble, &run.setup, &run.solve,
+        &run.iterations, &run.bytes, &run.cpu, &run.again) != 7)
     {
       run.failure = "no answer from bench-diffusion-hypre";
     }
@@ -565,6 +620,15 @@ struct Entry
     }
     return s;
   }
+  double again() const
+  {
+    std::vector<double> s;
+    for (const Run& run : this->runs)
+    {
+      s.push_back(run.again);
+    }
+    return median(s);
+  }
   double cpu() const
   {
     std::vector<double> s;
@@ -584,18 +648,21 @@ constexpr double FloorBytes = 24.; // 3 faces, sink, x in, y out
 bool MeasureSolves(const Options& options, double triad)
 {
   Table csv(options, "solve",
-    "medium,size,solver,threads,seconds,seconds_min,seconds_max,cpu_seconds,assemble,setup,solve,"
+    "medium,size,solver,threads,seconds,seconds_min,seconds_max,again,cpu_seconds,assemble,setup,"
+    "solve,"
     "iterations,applications,bytes_per_voxel,resident_per_voxel,residual,p95,relative_l2,repeats");
   std::printf(
     "\n## The steady solve, relative residual %.0e\n\n"
     "s: set-up + solve (hypre's and Eigen's filling of the matrix, OpenVDB's of the tree are not "
-    "in it; D to phi for this solver). Residual: |q - A phi| / |q| in double by the same function "
+    "in it; D to phi for this solver), in memory that is fresh from the system; again: the same in "
+    "a heap that a solve before it has left. Residual: |q - A phi| / |q| in double by the same "
+    "function "
     "for all (OpenVDB stops by the maximum norm, the others by this one). Bytes beyond the input, "
     "phi included: as the solver tells (hypre: resident). "
     "Errors as above.\n\n"
-    "| size | medium | solver | threads | s | min - max | CPU s | assembly | iterations | "
-    "fine applications | residual | L2 | p95 | bytes / voxel | ns / voxel |\n"
-    "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    "| size | medium | solver | threads | s | min - max | again, s | CPU s | assembly | iterations "
+    "| fine applications | residual | L2 | p95 | bytes / voxel | ns / voxel | again |\n"
+    "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     options.tolerance);
   std::ostringstream summary;
   bool kept = true;
@@ -629,7 +696,8 @@ bool MeasureSolves(const Options& options, double triad)
       for (const int t : options.threads)
       {
         entries.push_back({ "lighttransport", t,
-          [&, t](std::vector<double>& phi, bool) { return SolveOurs(problem, tolerance, t, phi); },
+          [&, t](std::vector<double>& phi, bool)
+          { return SolveOursTwice(problem, tolerance, t, phi); },
           {} });
       }
       if (problem.constant)
@@ -701,8 +769,10 @@ bool MeasureSolves(const Options& options, double triad)
           entry.runs.push_back(run);
         }
       }
-      const double resident =
-        (8. * voxels + PeakGrowth([&]() { SolveOurs(problem, tolerance, threads, phi); })) / voxels;
+      const double resident = n > 256
+        ? -1.
+        : (8. * voxels + PeakGrowth([&]() { SolveOurs(problem, tolerance, threads, phi); })) /
+          voxels;
 
       for (const Entry& entry : entries)
       {
@@ -712,33 +782,38 @@ bool MeasureSolves(const Options& options, double triad)
         const double most = *std::max_element(s.begin(), s.end());
         const bool ours = entry.solver == "lighttransport";
         kept = kept && !(ours && (!run.failure.empty() || !(run.residual <= 1.1 * tolerance)));
-        std::printf(
-          "| %d³ | %s | %s | %d | %.3f | %.3f - %.3f | %.3f | %s | %d | %s | %s | %s | %s | %s "
-          "| %.0f |%s\n",
+        std::printf("| %d³ | %s | %s | %d | %.3f | %.3f - %.3f | %s | %.3f | %s | %d | %s | %s | "
+                    "%s | %s | %s "
+                    "| %.0f | %s |%s\n",
           n, problem.name.c_str(), entry.solver.c_str(), entry.threads, median(s), least, most,
-          entry.cpu(), number(run.assemble, "%.3f").c_str(), run.iterations,
-          number(run.applications, "%.0f").c_str(), number(run.residual, "%.1e").c_str(),
-          number(run.errors.relativeL2, "%.1e").c_str(), number(run.errors.p95, "%.1e").c_str(),
-          number(run.bytes / voxels, "%.0f").c_str(), 1e9 * median(s) / voxels,
+          number(entry.again(), "%.3f").c_str(), entry.cpu(), number(run.assemble, "%.3f").c_str(),
+          run.iterations, number(run.applications, "%.0f").c_str(),
+          number(run.residual, "%.1e").c_str(), number(run.errors.relativeL2, "%.1e").c_str(),
+          number(run.errors.p95, "%.1e").c_str(), number(run.bytes / voxels, "%.0f").c_str(),
+          1e9 * median(s) / voxels, number(1e9 * entry.again() / voxels, "%.0f").c_str(),
           run.failure.empty() ? "" : (" " + run.failure).c_str());
         csv.add('"' + problem.name + '"', n, entry.solver, entry.threads, median(s), least, most,
-          entry.cpu(), run.assemble, run.setup, run.solve, run.iterations, run.applications,
-          run.bytes / voxels, ours && entry.threads == threads ? resident : -1., run.residual,
-          run.errors.p95, run.errors.relativeL2, repeat);
+          entry.again(), entry.cpu(), run.assemble, run.setup, run.solve, run.iterations,
+          run.applications, run.bytes / voxels, ours && entry.threads == threads ? resident : -1.,
+          run.residual, run.errors.p95, run.errors.relativeL2, repeat);
       }
       std::fflush(stdout);
 
       // In each repeat this solver ran right beside the best of hypre's.
       std::vector<double> quotients;
+      std::vector<double> againQuotients;
       std::vector<double> cpuQuotients;
       std::vector<double> seconds;
+      std::vector<double> again;
       int iterations = 0;
       double applications = 0.;
       double bytes = 0.;
       for (int i = 0; i < repeat; ++i)
       {
         double theirs = 1e300;
+        double theirAgain = 1e300;
         double mine = 0.;
+        double myAgain = 0.;
         double theirCpu = 1e300;
         double myCpu = 1e300;
         for (const Entry& entry : entries)
@@ -747,6 +822,7 @@ bool MeasureSolves(const Options& options, double triad)
           if (entry.solver == "hypre PCG+PFMG" && run.failure.empty())
           {
             theirs = std::min(theirs, run.seconds());
+            theirAgain = std::min(theirAgain, run.again);
             theirCpu = std::min(theirCpu, run.cpu);
           }
           if (entry.solver == "lighttransport")
@@ -756,26 +832,32 @@ bool MeasureSolves(const Options& options, double triad)
           if (entry.solver == "lighttransport" && entry.threads == threads)
           {
             mine = run.seconds();
+            myAgain = run.again;
             iterations = run.iterations;
             applications = run.applications;
             bytes = run.bytes / voxels;
           }
         }
         seconds.push_back(mine);
+        again.push_back(myAgain);
         if (theirs < 1e300)
         {
           quotients.push_back(theirs / mine);
+          againQuotients.push_back(theirAgain / myAgain);
           cpuQuotients.push_back(theirCpu / myCpu);
         }
       }
-      char line[256];
+      char line[400];
       const double floor = triad > 0. ? FloorApplications * FloorBytes * voxels / triad : -1.;
       std::snprintf(line, sizeof line,
-        "| %d³ | %s | %.3f | %s | %s | %d | %.0f | %s | %s | %.0f | %.0f | %.0f |\n", n,
-        problem.name.c_str(), median(seconds), number(median(quotients), "%.2f").c_str(),
+        "| %d³ | %s | %.3f | %s | %.3f | %s | %s | %d | %.0f | %s | %s | %.0f | %s | %.0f | %.0f "
+        "|\n",
+        n, problem.name.c_str(), median(seconds), number(median(quotients), "%.2f").c_str(),
+        median(again), number(median(againQuotients), "%.2f").c_str(),
         number(median(cpuQuotients), "%.2f").c_str(), iterations, applications,
-        number(floor, "%.4f").c_str(), number(median(seconds) / floor, "%.1f").c_str(), bytes,
-        resident, 1e9 * median(seconds) / voxels);
+        number(floor, "%.4f").c_str(), number(median(again) / floor, "%.1f").c_str(), bytes,
+        number(resident, "%.0f").c_str(), 1e9 * median(seconds) / voxels,
+        1e9 * median(again) / voxels);
       summary << line;
     }
   }
@@ -784,10 +866,10 @@ bool MeasureSolves(const Options& options, double triad)
               "repeat's quotient; in CPU seconds: the least of either's, which others' load "
               "hardly touches. Floor: %.0f fine-grid operator applications (HPGMG) of %.0f "
               "bytes per voxel at the triad's bandwidth.\n\n"
-              "| size | medium | s | times faster | in CPU s | iterations | fine "
-              "applications | floor, s | times the floor | bytes / voxel told | resident | "
-              "ns / voxel |\n"
-              "|---|---|---|---|---|---|---|---|---|---|---|---|\n%s",
+              "| size | medium | s | times faster | again, s | times faster | in CPU s | "
+              "iterations | fine applications | floor, s | again, times the floor | "
+              "bytes / voxel told | resident | ns / voxel | again |\n"
+              "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n%s",
     threads, FloorApplications, FloorBytes, summary.str().c_str());
   std::fflush(stdout);
   return kept;
@@ -839,7 +921,6 @@ bool Parse(int argc, char* argv[], Options& options)
     {
       options.sizes.push_back(384);
       options.sizes.push_back(512);
-      options.largestHypre = 384;
       continue;
     }
     const char* value = i + 1 < argc ? argv[++i] : nullptr;
@@ -847,7 +928,11 @@ bool Parse(int argc, char* argv[], Options& options)
     {
       return false;
     }
-    if (option == "--output")
+    if (option == "--media")
+    {
+      options.media = numbers(value);
+    }
+    else if (option == "--output")
     {
       options.output = value;
     }
@@ -884,6 +969,8 @@ bool Parse(int argc, char* argv[], Options& options)
   return !options.threads.empty() && options.repeat > 0 && options.tolerance > 0. &&
     options.errorSize >= 16 &&
     std::none_of(options.threads.begin(), options.threads.end(), tooSmall(1)) &&
+    std::none_of(
+      options.media.begin(), options.media.end(), [](int m) { return m < 1 || m > 3; }) &&
     std::none_of(options.sizes.begin(), options.sizes.end(), tooSmall(16));
 }
 } // namespace
@@ -894,8 +981,8 @@ int main(int argc, char* argv[])
   if (!Parse(argc, argv, options))
   {
     std::fprintf(stderr,
-      "usage: bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256] [--threads 1,2]\n"
-      "  [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]\n"
+      "usage: bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256] [--media 1,2,3]\n"
+      "  [--threads 1,2] [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]\n"
       "  [--error-size 128] [--large] [--quick]        (sizes are 16 at least)\n");
     return 2;
   }

@@ -8,8 +8,9 @@
  *
  * Each rank has a slab of z. Prints one line: seconds to fill and assemble the
  * matrix, of set-up, of the solve; iterations; bytes resident beyond the input
- * and CPU seconds of set-up and solve, all ranks together. The tolerance is for |b - A x| / |b| in
- * the 2-norm.
+ * and CPU seconds of set-up and solve, all ranks together; and, of PFMG, seconds of a second
+ * set-up and solve, with all of it anew in the heap that the first one left (-1: none). The
+ * tolerance is for |b - A x| / |b| in the 2-norm.
  *
  * PFMG: one symmetric sweep of red-black Gauss-Seidel before and after, skipped on
  * levels where it may be, symmetric storage: of the 12 combinations of smoother,
@@ -36,6 +37,10 @@
 #include <fstream>
 #include <sys/mman.h>
 #include <unistd.h>
+
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 using namespace lighttransport;
 using namespace lighttransport::benchmark;
@@ -202,6 +207,13 @@ Result solvePFMG(const Slab& slab, double tolerance)
   HYPRE_StructPCGGetNumIterations(pcg, &result.iterations);
   result.x.resize(static_cast<std::size_t>(slab.size()));
   HYPRE_StructVectorGetBoxValues(x, lower, upper, result.x.data());
+  HYPRE_StructPCGDestroy(pcg);
+  HYPRE_StructPFMGDestroy(pfmg);
+  HYPRE_StructMatrixDestroy(A);
+  HYPRE_StructVectorDestroy(b);
+  HYPRE_StructVectorDestroy(x);
+  HYPRE_StructStencilDestroy(stencil);
+  HYPRE_StructGridDestroy(grid);
   return result;
 }
 
@@ -313,6 +325,11 @@ Result solveBoomerAMG(const Slab& slab, double tolerance)
 
 int main(int argc, char* argv[])
 {
+#if defined(__GLIBC__)
+  // The heap keeps what is freed: the second solve finds its memory there.
+  mallopt(M_MMAP_MAX, 0);
+  mallopt(M_TRIM_THRESHOLD, -1); // never
+#endif
   MPI_Init(&argc, &argv);
   HYPRE_Init();
   int rank = 0;
@@ -355,8 +372,14 @@ int main(int argc, char* argv[])
   slab.z1 = slab.n[2] * (rank + 1) / ranks;
 
   const double tolerance = std::atof(argv[3]);
-  Result result = std::strcmp(argv[2], "pfmg") == 0 ? solvePFMG(slab, tolerance)
-                                                    : solveBoomerAMG(slab, tolerance);
+  const bool pfmg = std::strcmp(argv[2], "pfmg") == 0;
+  Result result = pfmg ? solvePFMG(slab, tolerance) : solveBoomerAMG(slab, tolerance);
+  double again = -1.;
+  if (pfmg)
+  {
+    const Result second = solvePFMG(slab, tolerance);
+    again = second.setup + second.solve;
+  }
   double bytes = 0.;
   MPI_Reduce(&result.bytes, &bytes, 1, MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD);
   double cpu = 0.;
@@ -383,8 +406,8 @@ int main(int argc, char* argv[])
   MPI_Barrier(MPI_COMM_WORLD);
   if (rank == 0)
   {
-    std::printf("%.6f %.6f %.6f %d %.0f %.6f\n", result.assemble, result.setup, result.solve,
-      result.iterations, bytes, cpu);
+    std::printf("%.6f %.6f %.6f %d %.0f %.6f %.6f\n", result.assemble, result.setup, result.solve,
+      result.iterations, bytes, cpu, again);
   }
   // What hypre holds goes with the process.
   MPI_Finalize();

@@ -20,6 +20,7 @@ struct Run
   double assemble = -1.; ///< seconds to bring D and sigma_a into the solver's form, if it is told
   double setup = 0.;     ///< seconds, without assemble
   double solve = 0.;     ///< seconds
+  double again = -1.;    ///< seconds of a second set-up and solve, in memory that the first left
   double cpu = -1.;      ///< CPU seconds of both, all threads: nearly blind to others' load
   int iterations = -1;
   double applications = -1.; ///< of the operator on the finest grid
