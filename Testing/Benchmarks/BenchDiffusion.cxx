@@ -671,13 +671,16 @@ bool MeasureSolves(const Options& options, double triad)
   for (const int n : options.sizes)
   {
     std::vector<MediumRecipe> recipes;
-    if (options.has("solve"))
+    for (const int medium : options.media)
     {
-      recipes.assign(std::begin(Recipes), std::end(Recipes));
-    }
-    if (n <= 256 || options.has("constant"))
-    {
-      recipes.push_back({ 0., 0. });
+      if (medium < 3 && options.has("solve"))
+      {
+        recipes.push_back(Recipes[medium - 1]);
+      }
+      else if (medium == 3 && (n <= 256 || options.has("constant")))
+      {
+        recipes.push_back({ 0., 0. });
+      }
     }
     for (const MediumRecipe& recipe : recipes)
     {
