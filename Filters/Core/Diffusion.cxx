@@ -1046,14 +1046,6 @@ void DiffusionSolver::prepareMultigrid(const MultigridWork& work, const Parallel
     this->storeFaces();
     this->multigrid.setup(this->A, work, loop);
     this->multigridReady = true;
-    // kernels read values beside a row, times a face of 0: that must be finite
-    const std::int64_t n = this->box.dims[0];
-    ForEachRow(this->A, this->parallelFor,
-      [&](std::int64_t row, std::int64_t, int)
-      {
-        std::fill(work.first + row * n, work.first + (row + 1) * n, 0.f);
-        std::fill(work.second + row * n, work.second + (row + 1) * n, 0.f);
-      });
   }
 }
 

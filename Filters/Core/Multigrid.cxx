@@ -21,7 +21,7 @@ constexpr int TilePlanes = 16;
 constexpr float LeastPart = 0.3f;
 
 /** Levels 1 to this take two steps of conjugate gradients, see Multigrid::solveCoarse. */
-constexpr std::size_t AcceleratedLevels = 2;
+constexpr std::size_t AcceleratedLevels = 1;
 
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView
@@ -1104,6 +1104,13 @@ void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
   this->raise(A, fine, all, coarse.A, parallelFor);
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
+  // kernels read values beside a row, times a face of 0: that must be finite
+  ForEachRow(A, parallelFor,
+    [&](std::int64_t row, std::int64_t, int)
+    {
+      std::fill(work.first + row * n[0], work.first + (row + 1) * n[0], 0.f);
+      std::fill(work.second + row * n[0], work.second + (row + 1) * n[0], 0.f);
+    });
 }
 
 void Multigrid::weighRow(
