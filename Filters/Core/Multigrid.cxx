@@ -21,7 +21,7 @@ constexpr int TilePlanes = 16;
 constexpr float LeastPart = 0.3f;
 
 /** Levels 1 to this take two steps of conjugate gradients, see Multigrid::solveCoarse. */
-constexpr std::size_t AcceleratedLevels = 1;
+constexpr std::size_t AcceleratedLevels = 2;
 
 /** A row's values and its four neighbouring rows; rows outside are zeros. */
 struct RowView

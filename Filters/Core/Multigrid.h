@@ -29,8 +29,8 @@
  *   4. Smoothing is Gauss-Seidel by colour, red-black before and black-red after the
  *      coarse correction, twice each. After a red-black sweep only red voxels have a
  *      residual, and only they need a correction.
- *   5. The second grid takes two steps of conjugate gradients around its own cycle (Notay
- *      and Vassilevski 2008, a K-cycle), so that what a coarse operator over- or
+ *   5. The second and the third grid take two steps of conjugate gradients around their own
+ *      cycle (Notay and Vassilevski 2008, a K-cycle), so that what a coarse operator over- or
  *      underestimates is scaled right. The cycle is then not quite linear: whoever uses
  *      it as a preconditioner takes a flexible method.
  *

@@ -250,7 +250,7 @@ void budget(Suite& suite)
 /** Whatever the threads: the same field of a region, the same estimate, the same stop. */
 void threads(Suite& suite)
 {
-  const DiffusionScene scene = tube(64, 1e-4, 11.);
+  const DiffusionScene scene = tube(64, 1e-4, 10.);
   const auto solve = [&](const ParallelFor& parallelFor, bool active, std::vector<double>& phi)
   {
     phi = scene.phi;
