@@ -74,6 +74,18 @@ class TestPipeline(unittest.TestCase):
         core = fluence[x**2 + y**2 + z**2 < 4**2]
         far = fluence[x**2 + y**2 + z**2 > 9**2]
         self.assertGreater(core.min(), 100 * far.max())
+        # a named error chooses, and says what: the field is right where it was
+        light.SetTargetError(0.01)
+        light.Update()
+        self.assertEqual(light.GetStopReasonAsString(), "Converged")
+        self.assertTrue(0.0 < light.GetEstimatedError() <= 0.01)
+        self.assertTrue(0.0 <= light.GetEstimatedErrorL2() <= 0.1)
+        self.assertTrue(0.0 < light.GetActiveFraction() <= 1.0)
+        self.assertIn(light.GetUsedCoarseningFactor(), (1, 2))
+        rough = array_of(light.GetOutput(), "Fluence")
+        seen = fluence > 1e-6 * fluence.max()
+        errors = numpy.abs(rough - fluence)[seen] / fluence[seen]
+        self.assertLessEqual(numpy.percentile(errors, 95), 0.01)
 
     def test_strength_of_a_lamp(self):
         """phi is linear in q: twice the power, twice the light; and its negative cancels it."""
