@@ -368,14 +368,14 @@ void gatherRow(int n, const float* LIGHTTRANSPORT_RESTRICT v, const Weights& x, 
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT y1 = y.there;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT z0 = z.here;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT z1 = z.there;
-  const float cy = y.factor, sy = y.slope, cz = z.factor, sz = z.slope;
+  constexpr float unit = 1.f / 510.f;
+  const int cy = 2 * y.whole, sy = y.sign, cz = 2 * z.whole, sz = z.sign;
   for (int i = 0; i < n; ++i)
   {
-    const float t = v[i] * (cy + sy * static_cast<float>(y0[i] + y1[i])) *
-      (cz + sz * static_cast<float>(z0[i] + z1[i]));
-    const float u = t * (static_cast<float>(x0[i] + x1[i]) * (0.5f / 255.f));
-    own[i] += t - u;
-    next[i] += u;
+    const float t = v[i] * (unit * static_cast<float>(cy + sy * (y0[i] + y1[i]))) *
+      (unit * static_cast<float>(cz + sz * (z0[i] + z1[i])));
+    own[i] += t * (unit * static_cast<float>(510 - x0[i] - x1[i]));
+    next[i] += t * (unit * static_cast<float>(x0[i] + x1[i]));
   }
 }
 
@@ -392,17 +392,18 @@ void gatherFacesRow(int n, const float* LIGHTTRANSPORT_RESTRICT between,
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT y1 = y.there;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT z0 = z.here;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT z1 = z.there;
-  const float cy = y.factor, sy = y.slope, cz = z.factor, sz = z.slope;
+  constexpr float unit = 1.f / 510.f;
+  const int cy = 2 * y.whole, sy = y.sign, cz = 2 * z.whole, sz = z.sign;
   float* LIGHTTRANSPORT_RESTRICT own1 = own + room;
   float* LIGHTTRANSPORT_RESTRICT own2 = own + 2 * room;
   float* LIGHTTRANSPORT_RESTRICT next1 = next + room;
   float* LIGHTTRANSPORT_RESTRICT next2 = next + 2 * room;
   for (int i = 0; i < n; ++i)
   {
-    const float t =
-      (cy + sy * static_cast<float>(y0[i] + y1[i])) * (cz + sz * static_cast<float>(z0[i] + z1[i]));
-    const float u = t * (static_cast<float>(x0[i] + x1[i]) * (0.5f / 255.f));
-    const float p = t - u;
+    const float t = (unit * static_cast<float>(cy + sy * (y0[i] + y1[i]))) *
+      (unit * static_cast<float>(cz + sz * (z0[i] + z1[i])));
+    const float u = t * (unit * static_cast<float>(x0[i] + x1[i]));
+    const float p = t * (unit * static_cast<float>(510 - x0[i] - x1[i]));
     own[i] += between[i] * p;
     next[i] += between[i] * u;
     own1[i] += below[i] * p;
@@ -443,14 +444,13 @@ void weightRow(int n, const std::uint8_t* LIGHTTRANSPORT_RESTRICT kept, const We
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT wx = x.here;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT wy = y.here;
   const std::uint8_t* LIGHTTRANSPORT_RESTRICT wz = z.here;
-  const float cy = y.factor, sy = 2.f * y.slope, cz = z.factor, sz = 2.f * z.slope;
+  const int cy = y.whole, sy = y.sign, cz = z.whole, sz = z.sign;
   for (int i = 0; i < n; ++i)
   {
-    const float t = unit * static_cast<float>(kept[i]) * (cy + sy * static_cast<float>(wy[i])) *
-      (cz + sz * static_cast<float>(wz[i]));
-    const float u = t * unit * static_cast<float>(wx[i]);
-    a[i] = t - u;
-    b[i] = u;
+    const float t = unit * static_cast<float>(kept[i]) *
+      (unit * static_cast<float>(cy + sy * wy[i])) * (unit * static_cast<float>(cz + sz * wz[i]));
+    a[i] = t * (unit * static_cast<float>(255 - wx[i]));
+    b[i] = t * (unit * static_cast<float>(wx[i]));
   }
 }
 
@@ -567,20 +567,23 @@ void depositRow(int first, int last, const MultigridLine& v, const float* LIGHTT
   for (int I = first; I < last; ++I)
   {
     const float t = value[2 * I] * unit * static_cast<float>(kept[I]);
-    const float u = t * unit * static_cast<float>(wx[I]);
-    const float b = unit * static_cast<float>(wy[I]);
-    const float c = unit * static_cast<float>(wz[I]);
-    const float f3 = b * c;
-    const float f2 = c - f3;
-    const float f1 = b - f3;
-    const float f0 = 1.f - c - f1;
-    o0[I] = (t - u) * f0;
+    const float u = t * (unit * static_cast<float>(wx[I]));
+    const float p = t * (unit * static_cast<float>(255 - wx[I]));
+    const float b1 = unit * static_cast<float>(wy[I]);
+    const float b0 = unit * static_cast<float>(255 - wy[I]);
+    const float c1 = unit * static_cast<float>(wz[I]);
+    const float c0 = unit * static_cast<float>(255 - wz[I]);
+    const float f0 = b0 * c0;
+    const float f1 = b1 * c0;
+    const float f2 = b0 * c1;
+    const float f3 = b1 * c1;
+    o0[I] = p * f0;
     n0[I] = u * f0;
-    o1[I] = (t - u) * f1;
+    o1[I] = p * f1;
     n1[I] = u * f1;
-    o2[I] = (t - u) * f2;
+    o2[I] = p * f2;
     n2[I] = u * f2;
-    o3[I] = (t - u) * f3;
+    o3[I] = p * f3;
     n3[I] = u * f3;
   }
 }
@@ -616,16 +619,19 @@ void prolongRow(int first, int last, const MultigridLine& v, const float* const*
   const float* s3 = u3 + side;
   for (int I = first; I < last; ++I)
   {
-    const float a = unit * static_cast<float>(wx[I]);
-    const float b = unit * static_cast<float>(wy[I]);
-    const float c = unit * static_cast<float>(wz[I]);
-    const float v0 = u0[I] + a * (s0[I] - u0[I]);
-    const float v1 = u1[I] + a * (s1[I] - u1[I]);
-    const float v2 = u2[I] + a * (s2[I] - u2[I]);
-    const float v3 = u3[I] + a * (s3[I] - u3[I]);
-    const float y0 = v0 + b * (v1 - v0);
-    const float y1 = v2 + b * (v3 - v2);
-    to[I] = unit * static_cast<float>(kept[I]) * (y0 + c * (y1 - y0));
+    const float a1 = unit * static_cast<float>(wx[I]);
+    const float a0 = unit * static_cast<float>(255 - wx[I]);
+    const float b1 = unit * static_cast<float>(wy[I]);
+    const float b0 = unit * static_cast<float>(255 - wy[I]);
+    const float c1 = unit * static_cast<float>(wz[I]);
+    const float c0 = unit * static_cast<float>(255 - wz[I]);
+    const float v0 = a0 * u0[I] + a1 * s0[I];
+    const float v1 = a0 * u1[I] + a1 * s1[I];
+    const float v2 = a0 * u2[I] + a1 * s2[I];
+    const float v3 = a0 * u3[I] + a1 * s3[I];
+    const float y0 = b0 * v0 + b1 * v1;
+    const float y1 = b0 * v2 + b1 * v3;
+    to[I] = unit * static_cast<float>(kept[I]) * (c0 * y0 + c1 * y1);
   }
 }
 
@@ -1226,11 +1232,11 @@ void Multigrid::weigh(const DiffusionOperator& A, const Level& fine, const LineW
     {
       const bool parent = d == 0 || at[d] / 2 == J[d];
       weights[d] = { all.row(A, row, d) + at[0], all.row(A, other, d) + at[0] + step,
-        parent ? 1.f : 0.f, (parent ? -0.5f : 0.5f) / 255.f };
+        parent ? 255 : 0, parent ? -1 : 1 };
     }
     else
     {
-      weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 1.f, 0.f };
+      weights[d] = { fine.noWeight.data(), fine.noWeight.data(), 255, 0 };
     }
   }
 }
@@ -1511,10 +1517,11 @@ void Multigrid::restrictRow(const DiffusionOperator& A, const Level& fine, Level
       float* to = bc + rows.row[m] * C.dims[0];
       for (int i = span.begin + ((span.begin + line.odd) & 1); i < span.end; i += 2)
       {
-        const float wy = unit * static_cast<float>(line.wy[i >> 1]);
-        const float wz = unit * static_cast<float>(line.wz[i >> 1]);
-        to[i] += r[i] * unit * static_cast<float>(line.kept[i >> 1]) * ((m & 1) ? wy : 1.f - wy) *
-          ((m >> 1) ? wz : 1.f - wz);
+        const int wy = line.wy[i >> 1];
+        const int wz = line.wz[i >> 1];
+        to[i] += r[i] * unit * static_cast<float>(line.kept[i >> 1]) *
+          (unit * static_cast<float>((m & 1) ? wy : 255 - wy)) *
+          (unit * static_cast<float>((m >> 1) ? wz : 255 - wz));
       }
     }
     return;
@@ -1573,11 +1580,13 @@ void Multigrid::prolongRow(const DiffusionOperator& A, const Level& fine, const 
     constexpr float unit = 1.f / 255.f;
     for (int i = span.begin + ((span.begin + line.odd) & 1); i < span.end; i += 2)
     {
-      const float b = unit * static_cast<float>(line.wy[i >> 1]);
-      const float c = unit * static_cast<float>(line.wz[i >> 1]);
-      const float y0 = e[0][i] + b * (e[1][i] - e[0][i]);
-      const float y1 = e[2][i] + b * (e[3][i] - e[2][i]);
-      to[i] += unit * static_cast<float>(line.kept[i >> 1]) * (y0 + c * (y1 - y0));
+      const float b1 = unit * static_cast<float>(line.wy[i >> 1]);
+      const float b0 = unit * static_cast<float>(255 - line.wy[i >> 1]);
+      const float c1 = unit * static_cast<float>(line.wz[i >> 1]);
+      const float c0 = unit * static_cast<float>(255 - line.wz[i >> 1]);
+      const float y0 = b0 * e[0][i] + b1 * e[1][i];
+      const float y1 = b0 * e[2][i] + b1 * e[3][i];
+      to[i] += unit * static_cast<float>(line.kept[i >> 1]) * (c0 * y0 + c1 * y1);
     }
     return;
   }

@@ -144,11 +144,15 @@ double Apply(const DiffusionOperator& A, const float* x, float* y, const Paralle
 double Advance(const DiffusionOperator& A, const float* z, float beta, float* p, float* y,
   const ParallelFor& parallelFor);
 
-/** (factor + slope (here + there)) is the weight of a voxel, or of a face, for a coarse row. */
+/**
+ * whole + sign w, in 255ths, is the weight of a voxel (w = here) or of a face (the mean of here and
+ * there) for a coarse row. In whole numbers: 1 - w/255 in float is -6e-8 where w is 255 (fused
+ * multiply-add), and a coarse face or sink made of that is negative at high contrast.
+ */
 struct MultigridWeights
 {
   const std::uint8_t *here, *there;
-  float factor, slope;
+  int whole, sign;
 };
 
 /** The weights along the lines of a row's red voxels x = 2 I + odd, at I. */
