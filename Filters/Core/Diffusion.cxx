@@ -1637,6 +1637,15 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     fresh = false;
     report.fineApplications += 1.;
+    if (!frugal && beta != 0. && std::isfinite(pAp) && !(pAp > 1e-2 * rz))
+    {
+      // z is hardly more than the direction before (where a step leaves nothing but rounding):
+      // what is conjugate to that is noise, and a step along it would be huge. Along z alone.
+      ForEachRow(op, loop,
+        [&](std::int64_t, std::int64_t o, int n) { combine(n, 0.f, z.data() + o, p.data() + o); });
+      pAp = Apply(op, p.data(), Ap.data(), loop);
+      report.fineApplications += 1.;
+    }
     if (cancelled)
     {
       cancel();

@@ -379,17 +379,20 @@ void honest(Suite& suite)
 /**
  * Wavy layers with parts cut out: where all of a fine voxel belongs to one coarse one, nothing of
  * it may leak to the other. What did, 6e-8 of the clear layers' faces, was negative and more than
- * the dark ones have: then the preconditioner is indefinite, and the solve ends NotFinite.
+ * the dark ones have: then the preconditioner is indefinite, and the solve ends NotFinite. A lamp
+ * in the dark is found in one step, and the next direction is the same again but for rounding: a
+ * solve that goes along the rounding ends Diverged.
  */
 void layers(Suite& suite)
 {
   int solved = 0;
-  for (int run = 0; run < 24; ++run)
+  for (int run = 0; run < 60; ++run)
   {
     std::mt19937 random(static_cast<unsigned int>(run));
     std::uniform_real_distribution<double> uniform(0., 1.);
     const int n = 16 + run % 12;
-    DiffusionScene scene({ { n, n + 3, n } }, { { 1., 1., std::pow(10., -uniform(random)) } });
+    DiffusionScene scene(
+      { { n, n + 3, n } }, { { 1., 1., std::pow(10., 1. - 2. * uniform(random)) } });
     const double contrast = std::pow(10., -4. - 4. * uniform(random));
     const double layer = 5. + 20. * uniform(random);
     std::vector<std::uint8_t> outside(scene.q.size(), 0);
@@ -402,7 +405,7 @@ void layers(Suite& suite)
       const double wave = std::sin(layer * (z + 0.1 * std::sin(5. * x) + 0.05 * y));
       scene.D[i] = wave > 0. ? contrast : 1.;
       scene.sigma_a[i] = (run % 2 == 0 ? 1e-7 : 1e-3) / scene.D[i];
-      outside[i] = wave > 0.6;
+      outside[i] = run % 3 != 0 && wave > 0.6;
     }
     const std::size_t lamp = outside.size() / 2 + static_cast<std::size_t>(n / 2);
     outside[lamp] = 0;
@@ -421,8 +424,8 @@ void layers(Suite& suite)
       __FILE__, __LINE__);
     solved += report.reason == StopReason::Converged;
   }
-  std::cout << solved << " of 24 layered media solved\n";
-  LT_CHECK(suite, solved >= 20);
+  std::cout << solved << " of 60 layered media solved\n";
+  LT_CHECK(suite, solved >= 57);
 }
 
 /** A NaN appears in the field while a solver works on it: it is seen, and never called solved. */
