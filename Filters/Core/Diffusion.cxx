@@ -2593,6 +2593,14 @@ DiffusionReport DiffusionSolver::march(
   const bool several = size >= SeveralStepsFrom && (!control.progress || size <= AskedInTimeUpTo);
   const std::size_t rowCount = static_cast<std::size_t>(this->rows());
   std::vector<double> squares(StepsInOnePass * rowCount);
+  double asked = began;
+  double rNorm = -1.; // of what the last step began with
+  const auto goOn = [&]
+  {
+    asked = now();
+    return !control.progress ||
+      control.progress(static_cast<double>(report.iterations) / static_cast<double>(steps));
+  };
   report.reason = StopReason::MaxIterations;
   while (report.iterations < steps)
   {
@@ -2622,14 +2630,29 @@ DiffusionReport DiffusionSolver::march(
     };
     if (stages == 1)
     {
-      ForRows(this->parallelFor, this->rows(), size,
-        [&](std::int64_t begin, std::int64_t end)
+      // In pieces of some milliseconds: who cancels does not wait for the step, which is dropped.
+      const std::int64_t piece = std::max<std::int64_t>(64, (std::int64_t(1) << 20) / nx);
+      for (std::int64_t first = 0; first < this->rows(); first += piece)
+      {
+        if (first > 0 && now() - asked > 0.02 && !goOn())
         {
-          for (std::int64_t r = begin; r < end; ++r)
+          report.reason = StopReason::Cancelled;
+          break;
+        }
+        const std::int64_t count = std::min(piece, this->rows() - first);
+        ForRows(this->parallelFor, count, count * nx,
+          [&](std::int64_t begin, std::int64_t end)
           {
-            advance(0, r);
-          }
-        });
+            for (std::int64_t r = first + begin; r < first + end; ++r)
+            {
+              advance(0, r);
+            }
+          });
+      }
+      if (report.reason == StopReason::Cancelled)
+      {
+        break;
+      }
     }
     else
     {
@@ -2638,13 +2661,12 @@ DiffusionReport DiffusionSolver::march(
     at = (at + stages) % 2;
     report.iterations += stages;
     report.fineApplications += stages;
-    // of what the last step began with
     double sum = 0.;
     for (std::size_t r = 0; r < rowCount; ++r)
     {
       sum += squares[static_cast<std::size_t>(stages - 1) * rowCount + r];
     }
-    const double rNorm = std::sqrt(sum);
+    rNorm = std::sqrt(sum);
     if (!std::isfinite(rNorm))
     {
       report.reason = StopReason::NotFinite;
@@ -2660,8 +2682,7 @@ DiffusionReport DiffusionSolver::march(
       control.intermediate(fields[at]);
       seen = now();
     }
-    if (control.progress &&
-      !control.progress(static_cast<double>(report.iterations) / static_cast<double>(steps)))
+    if (!goOn())
     {
       report.reason = StopReason::Cancelled;
       break;
@@ -2670,7 +2691,15 @@ DiffusionReport DiffusionSolver::march(
   const double* from = fields[at];
   if (from != phi)
   {
-    std::copy(from, from + size, phi);
+    ForRows(this->parallelFor, size, size,
+      [&](std::int64_t begin, std::int64_t end)
+      { std::copy(from + begin, from + end, phi + begin); });
+  }
+  if (report.reason == StopReason::Cancelled && rNorm >= 0. && qNorm > 0.)
+  {
+    report.residual = rNorm / qNorm; // at once: powers are not told
+    report.seconds = now() - began;
+    return report;
   }
   const double last = this->residual<T>(b, phi, nullptr, 1.);
   report.residual = qNorm > 0. ? last / qNorm : last;

@@ -5,7 +5,9 @@
 #include "LightTransportTesting.h"
 #include "ThreadedFor.h"
 
+#include <chrono>
 #include <random>
+#include <thread>
 
 using namespace lighttransport;
 using lighttransport::testing::DiffusionScene;
@@ -417,6 +419,33 @@ void together(Suite& suite)
     LT_CHECK(suite, shown == phi);
   }
 }
+
+/** Cancelled amid a step that takes long, phi is what it was before that step. */
+void amidStep(Suite& suite)
+{
+  DiffusionScene scene({ { 128, 128, 65 } }, { { 1., 1., 1. } });
+  scene.sigma_a.assign(scene.q.size(), 1e-2);
+  scene.D[7] = 0.5;
+  scene.q[100] = 1.;
+  scene.phi.assign(scene.q.size(), 2.);
+  bool slow = false;
+  DiffusionSolver solver(
+    [&slow](std::int64_t n, const RangeBody& body)
+    {
+      std::this_thread::sleep_for(std::chrono::milliseconds(slow ? 25 : 0));
+      body(0, n);
+    });
+  solver.setMedium(scene.medium());
+  const double bound = solver.positivityBound();
+  slow = true;
+  int calls = 0;
+  DiffusionControl control;
+  control.progress = [&calls](double) { return ++calls == 0; };
+  const DiffusionReport report =
+    solver.stepExplicit(scene.q.data(), scene.phi.data(), 1, bound, control);
+  LT_CHECK(suite, report.reason == StopReason::Cancelled && report.iterations == 0 && calls == 1);
+  LT_CHECK(suite, scene.phi == std::vector<double>(scene.q.size(), 2.));
+}
 } // namespace
 
 int main(int argc, char* argv[])
@@ -434,5 +463,6 @@ int main(int argc, char* argv[])
   stored(suite);
   secondOrder(suite);
   local(suite);
+  amidStep(suite);
   return suite.result();
 }
