@@ -423,6 +423,15 @@ struct OperatorSummary
 {
   float diagonal = 0.f, gershgorin = 0.f;
   bool sink = false, noSink = false, wall = false;
+
+  void add(const OperatorSummary& other)
+  {
+    this->diagonal = std::max(this->diagonal, other.diagonal);
+    this->gershgorin = std::max(this->gershgorin, other.gershgorin);
+    this->sink = this->sink || other.sink;
+    this->noSink = this->noSink || other.noSink;
+    this->wall = this->wall || other.wall;
+  }
 };
 
 LIGHTTRANSPORT_SIMD
@@ -772,10 +781,7 @@ void DiffusionSolver::describe(const DiffusionMedium<T>& medium)
       }
       OperatorSummary part;
       summarise(n[0], g[0], g[1], below[0], g[2], below[1], s, part);
-      total.diagonal = std::max(total.diagonal, part.diagonal);
-      total.gershgorin = std::max(total.gershgorin, part.gershgorin);
-      total.sink = total.sink || part.sink;
-      total.noSink = total.noSink || part.noSink;
+      total.add(part);
     }
   }
   this->largestDiagonal = static_cast<double>(total.diagonal);
@@ -918,10 +924,7 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
             {
               summary.wall = !(D[i] > T(0));
             }
-            summary.diagonal = std::max(summary.diagonal, part.diagonal);
-            summary.gershgorin = std::max(summary.gershgorin, part.gershgorin);
-            summary.sink = summary.sink || part.sink;
-            summary.noSink = summary.noSink || part.noSink;
+            summary.add(part);
           }
           first = last + 1;
         }
@@ -930,11 +933,7 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
   Summary total;
   for (const Summary& summary : summaries)
   {
-    total.diagonal = std::max(total.diagonal, summary.diagonal);
-    total.gershgorin = std::max(total.gershgorin, summary.gershgorin);
-    total.sink = total.sink || summary.sink;
-    total.noSink = total.noSink || summary.noSink;
-    total.wall = total.wall || summary.wall;
+    total.add(summary);
   }
   this->largestDiagonal = static_cast<double>(total.diagonal);
   this->gershgorin = static_cast<double>(total.gershgorin);

@@ -102,25 +102,6 @@ struct View
   }
 };
 
-double psnr(vtkImageData* a, vtkImageData* b)
-{
-  int size[3];
-  a->GetDimensions(size);
-  double squares = 0.;
-  for (int y = 0; y < size[1]; ++y)
-  {
-    for (int x = 0; x < size[0]; ++x)
-    {
-      for (int c = 0; c < 3; ++c)
-      {
-        const double d = pixel(a, x, y)[c] - pixel(b, x, y)[c];
-        squares += d * d;
-      }
-    }
-  }
-  return 10. * std::log10(255. * 255. * 3. * size[0] * size[1] / std::max(squares, 1.));
-}
-
 /**
  * Milliseconds of what each frame does beside drawing, in a picture of 8^2 pixels: the difference
  * to one whose lights stand.

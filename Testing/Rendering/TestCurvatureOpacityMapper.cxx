@@ -253,6 +253,9 @@ void testMany(Suite& suite)
     LT_CHECK(suite, mapper->GetNumberOfShapes() == cells);
     // No pixel has a neighbour of its shape: all outline, opaque white.
     LT_CHECK(suite, *std::min_element(pixels.begin(), pixels.end()) >= 252);
+    mapper->SetShapeIdArray("");
+    const auto one = scene.capture();
+    LT_CHECK(suite, std::count(one.begin(), one.end(), 255) < 48 * 48 * 2);
     LT_CHECK(suite, scene.log->messages.empty() && openGLErrors().empty());
   }
   {

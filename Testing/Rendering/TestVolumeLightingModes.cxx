@@ -14,26 +14,6 @@ using namespace lighttransport::testing;
 
 namespace
 {
-double psnr(vtkImageData* a, vtkImageData* b)
-{
-  int size[3];
-  a->GetDimensions(size);
-  double squares = 0.;
-  for (int y = 0; y < size[1]; ++y)
-  {
-    for (int x = 0; x < size[0]; ++x)
-    {
-      for (int c = 0; c < 3; ++c)
-      {
-        const double d = pixel(a, x, y)[c] - pixel(b, x, y)[c];
-        squares += d * d;
-      }
-    }
-  }
-  const double mean = squares / (3. * size[0] * size[1]);
-  return mean > 0. ? 10. * std::log10(255. * 255. / mean) : 99.;
-}
-
 /** Two suns; as scene lights they have exact fields. */
 template <typename S>
 void addSuns(S& scene)

@@ -34,6 +34,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -79,6 +80,27 @@ inline Color pixel(vtkImageData* picture, int x, int y)
 {
   const unsigned char* p = static_cast<unsigned char*>(picture->GetScalarPointer(x, y, 0));
   return { static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]) };
+}
+
+/** Peak signal to noise ratio of two pictures of one size: dB, where they are the same that of one
+ * value one level off. */
+inline double psnr(vtkImageData* a, vtkImageData* b)
+{
+  int size[3];
+  a->GetDimensions(size);
+  double squares = 0.;
+  for (int y = 0; y < size[1]; ++y)
+  {
+    for (int x = 0; x < size[0]; ++x)
+    {
+      for (int c = 0; c < 3; ++c)
+      {
+        const double d = pixel(a, x, y)[c] - pixel(b, x, y)[c];
+        squares += d * d;
+      }
+    }
+  }
+  return 10. * std::log10(255. * 255. * 3. * size[0] * size[1] / std::max(squares, 1.));
 }
 
 /** Mean colour (0..255) of the pixels from (x0, y0) to (x1, y1), both included; y upwards. */
