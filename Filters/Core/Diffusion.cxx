@@ -1496,6 +1496,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   double best = rNorm;
   int stalls = 0;
   double rz = 0.;
+  double rp = 0.;
   double alpha = 0.;
   double pScale = rScale; // p's unit
   bool restart = false;
@@ -1585,7 +1586,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     // (where z has overwritten A p, Fletcher and Reeves's form; r was perhaps rescaled since)
     const double beta = restart || iteration == 0 ? 0.
       : frugal                                    ? rzNew / rz * (rScale / pScale)
-                                                  : -alpha * zAp / rz;
+                                                  : -alpha * zAp / rp;
     pScale = rScale;
     const bool restarted = restart;
     restart = false;
@@ -1620,15 +1621,28 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         return;
       }
     }
-    // 4. alpha = r . z / p . A p, with A p = A z + beta A p_old but where the residual was
-    //    recomputed: there A p is as well
+    // 4. alpha = r . p / p . A p, with A p = A z + beta A p_old but where the residual was
+    //    recomputed: there A p is as well, and r . p, which is r . z else
     double pAp = 0.;
+    rp = rz;
     if (fresh || frugal)
     {
       ForEachRow(op, loop,
         [&](std::int64_t, std::int64_t o, int n)
         { combine(n, static_cast<float>(beta), z.data() + o, p.data() + o); });
       pAp = Apply(op, p.data(), Ap.data(), loop);
+      if (fresh && beta != 0.)
+      {
+        // The recomputed r has parts along p that the last step should have taken: with r . z the
+        // step would be too long by far, and every one after it again.
+        rp = SumEachRow(op, loop,
+          [&](std::int64_t, std::int64_t o, int n)
+          {
+            double sums[2];
+            twoDots(n, p.data() + o, r.data() + o, r.data() + o, sums);
+            return sums[0];
+          });
+      }
     }
     else
     {
@@ -1636,13 +1650,14 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     fresh = false;
     report.fineApplications += 1.;
-    if (!frugal && beta != 0. && std::isfinite(pAp) && !(pAp > 1e-2 * rz))
+    if (!frugal && beta != 0. && std::isfinite(pAp) && (!(pAp > 1e-2 * rz) || !(rp > 0.)))
     {
       // z is hardly more than the direction before (where a step leaves nothing but rounding):
       // what is conjugate to that is noise, and a step along it would be huge. Along z alone.
       ForEachRow(op, loop,
         [&](std::int64_t, std::int64_t o, int n) { combine(n, 0.f, z.data() + o, p.data() + o); });
       pAp = Apply(op, p.data(), Ap.data(), loop);
+      rp = rz;
       report.fineApplications += 1.;
     }
     if (cancelled)
@@ -1656,8 +1671,12 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       report.message = "a search direction has no energy";
       return;
     }
-    alpha = rz / pAp;
-    slow.add(alpha, rzOfPhi, restarted);
+    alpha = rp / pAp;
+    restart = !(rp > 0.);
+    if (!restart)
+    {
+      slow.add(alpha, rzOfPhi, restarted);
+    }
     // 5. phi += alpha p, r -= alpha A p; not interrupted: phi stays a whole
     rNorm = rScale *
       std::sqrt(SumEachRow(op, this->parallelFor,
@@ -1695,7 +1714,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         return;
       }
       // Where float's recursion has lost the residual, its directions are lost too.
-      restart = rNorm > 1.5 * recurred;
+      restart = restart || rNorm > 1.5 * recurred;
       // Double itself is at its end when the recomputed norm no longer follows.
       stalls = rNorm > 0.5 * best && recurred < 0.5 * rNorm ? stalls + 1 : 0;
       best = std::min(best, rNorm);

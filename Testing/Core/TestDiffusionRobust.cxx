@@ -428,6 +428,39 @@ void layers(Suite& suite)
   LT_CHECK(suite, solved >= 57);
 }
 
+/**
+ * Steps of media so easy that a solve's first step leaves nothing but rounding. The recomputed
+ * residual then has parts along that step's direction: a next one as long as if it had none never
+ * ends.
+ */
+void easySteps(Suite& suite)
+{
+  int most = 0;
+  for (int run = 0; run < 300; ++run)
+  {
+    std::mt19937 random(static_cast<unsigned int>(run));
+    std::uniform_real_distribution<double> uniform(0., 1.);
+    DiffusionScene scene({ { 1, 1 + run % 3, 20 + run % 50 } }, { { 1., 1., 1. } });
+    for (std::size_t i = 0; i < scene.q.size(); ++i)
+    {
+      const double beta = uniform(random) < 0.9 ? 1e-4 : 1.;
+      scene.D[i] = beta;
+      scene.sigma_a[i] = 1. - beta;
+    }
+    scene.q[scene.q.size() / 3] = -1.;
+    DiffusionSolver solver;
+    solver.setMedium(scene.medium());
+    DiffusionControl control;
+    control.tolerance = std::pow(10., -6. - 6. * uniform(random));
+    control.implicitScheme = ImplicitScheme::SecondOrder;
+    const DiffusionReport report = solver.stepImplicit(
+      scene.q.data(), scene.phi.data(), 2, 200. * solver.positivityBound(), control);
+    most = std::max(most, report.iterations);
+  }
+  std::cout << "four solves of easy steps: at most " << most << " iterations\n";
+  LT_CHECK(suite, most > 0 && most <= 60);
+}
+
 /** A NaN appears in the field while a solver works on it: it is seen, and never called solved. */
 void notFinite(Suite& suite)
 {
@@ -478,6 +511,7 @@ int main(int argc, char* argv[])
   signs(suite);
   honest(suite);
   layers(suite);
+  easySteps(suite);
   notFinite(suite);
   hardMedia(suite);
   noAnswer(suite);
