@@ -462,10 +462,10 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
           // phi goes as sinh there: the voxel behind tells how fast
           const std::int64_t behind = i - side * this->stride[d];
           const bool known = at[d] - side >= 0 && at[d] - side < n[d];
-          const double ratio =
-            known ? 0.5 * std::abs(phi[behind]) / std::max(1e-300, std::abs(phi[i])) : 1.;
-          const double measured =
-            ratio > 1. && ratio < 1e100 ? std::log(ratio + std::sqrt(ratio * ratio - 1.)) : 0.;
+          const double before = known ? 0.5 * std::abs(phi[behind]) : 0.;
+          const double here = std::abs(phi[i]);
+          const double ratio = before > here && before < 1e100 * here ? before / here : 1.;
+          const double measured = std::log(ratio + std::sqrt(ratio * ratio - 1.));
           const double c = std::max({ 0.1, measured, this->step(i, j, d) });
           lost = std::max(lost, -std::log(-std::expm1(-2. * c)));
         }

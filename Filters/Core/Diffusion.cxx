@@ -1607,7 +1607,6 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         report.estimatedError <= 0.5 * control.targetError)
       {
         finish(StopReason::Converged);
-        report.reason = StopReason::Converged;
         return;
       }
       // another iteration, and the last look at the residual
@@ -2034,6 +2033,46 @@ bool DiffusionSolver::steadyStateExists(
 }
 
 //------------------------------------------------------------------------------
+const std::uint8_t* DiffusionSolver::outsideOfDomain() const
+{
+  return this->floatMedium.D ? this->floatMedium.outside : this->doubleMedium.outside;
+}
+
+template <class T>
+bool DiffusionSolver::startsInside(const T* q, DiffusionReport& report) const
+{
+  const std::uint8_t* outside = this->outsideOfDomain();
+  if (!outside || !q)
+  {
+    return true;
+  }
+  std::atomic<std::int64_t> bad{ -1 };
+  ForEachRow(this->A, this->parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
+    {
+      for (std::int64_t i = o; i < o + n; ++i)
+      {
+        if (outside[i] && q[i] != T(0))
+        {
+          bad = i;
+        }
+      }
+    });
+  if (bad < 0)
+  {
+    return true;
+  }
+  const std::array<int, 3>& n = this->box.dims;
+  std::ostringstream text;
+  text << "the source is " << q[bad] << " at voxel (" << bad % n[0] << ", " << (bad / n[0]) % n[1]
+       << ", " << bad / (static_cast<std::int64_t>(n[0]) * n[1])
+       << "), outside the domain; expected 0 there";
+  report.reason = StopReason::BadInput;
+  report.message = text.str();
+  return false;
+}
+
+//------------------------------------------------------------------------------
 template <class T>
 DiffusionReport DiffusionSolver::solveSteady(
   const T* q, double* phi, const DiffusionControl& control)
@@ -2043,7 +2082,7 @@ DiffusionReport DiffusionSolver::solveSteady(
   this->setShift(0.);
   bool singular = false;
   std::vector<std::uint8_t> reached;
-  if (this->steadyStateExists(q, singular, reached, report))
+  if (this->startsInside(q, report) && this->steadyStateExists(q, singular, reached, report))
   {
     const std::int64_t size = this->box.size();
     const auto darken = [&]
@@ -2054,6 +2093,17 @@ DiffusionReport DiffusionSolver::solveSteady(
       }
     };
     darken(); // a start from elsewhere
+    if (const std::uint8_t* outside = this->outsideOfDomain())
+    {
+      ForEachRow(this->A, this->parallelFor,
+        [&](std::int64_t, std::int64_t o, int n)
+        {
+          for (std::int64_t i = o; i < o + n; ++i)
+          {
+            phi[i] = outside[i] ? 0. : phi[i];
+          }
+        });
+    }
     RightHandSide<T> b{ q, 1. / this->scale, false };
     if (singular)
     {
@@ -2414,6 +2464,10 @@ DiffusionReport DiffusionSolver::stepImplicit(
     report.message = "the time step c dt is not a positive length";
     return report;
   }
+  if (!this->startsInside(q, report))
+  {
+    return report;
+  }
   const RightHandSide<T> steady{ q, 1. / this->scale, true };
   const double qNorm = this->norm(steady);
   this->setShift(shifted);
@@ -2443,6 +2497,14 @@ DiffusionReport DiffusionSolver::stepImplicit(
       static_cast<double>(solve + 1) * part, report);
     if (report.reason != StopReason::Converged)
     {
+      if (report.reason == StopReason::MaxIterations) // else the reason of steps that are all made
+      {
+        std::ostringstream text;
+        text << "the linear solver of step " << solve / stages + 1 << " of " << steps
+             << " used up its iterations: the field is of a time before";
+        report.reason = StopReason::Breakdown;
+        report.message = text.str();
+      }
       break;
     }
     report.reason = StopReason::MaxIterations;
@@ -2493,7 +2555,12 @@ void DiffusionSolver::keepSign(
   const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
 {
   // Where the matrix ties voxels weakly, a small residual says little of their signs.
-  for (int again = 0; again < 3 && report.reason == StopReason::Converged && b.mean == 0.; ++again)
+  if (report.reason == StopReason::Cancelled || report.reason == StopReason::NotFinite ||
+    b.mean != 0.)
+  {
+    return;
+  }
+  for (int again = 0;; ++again)
   {
     struct Signs
     {
@@ -2536,6 +2603,19 @@ void DiffusionSolver::keepSign(
           phi[i] = all.above ? std::max(phi[i], 0.) : std::min(phi[i], 0.);
         }
       });
+    if (report.reason != StopReason::Converged || again == 3)
+    {
+      // The best answer so far, and what its residual is now.
+      report.residual = this->residual<T>(b, phi, nullptr, 1.) / this->norm(b);
+      report.fineApplications += 1.;
+      if (report.reason == StopReason::Converged && report.residual > control.tolerance &&
+        !(control.targetError > 0.))
+      {
+        report.reason = StopReason::Breakdown;
+        report.message = "the answer keeps a wrong sign, or does not meet the tolerance without";
+      }
+      return;
+    }
     if (this->isConstant)
     {
       this->solveConstant(b, phi, control, report);
@@ -2543,6 +2623,10 @@ void DiffusionSolver::keepSign(
     else
     {
       this->conjugateGradients(b, phi, control, 1., 1., report);
+    }
+    if (report.reason == StopReason::Cancelled || report.reason == StopReason::NotFinite)
+    {
+      return;
     }
   }
 }
@@ -2595,6 +2679,10 @@ DiffusionReport DiffusionSolver::march(
   const double began = now();
   const std::int64_t size = this->box.size();
   const int nx = this->box.dims[0];
+  if (!this->startsInside(q, report))
+  {
+    return report;
+  }
   this->storeFaces();
   this->setShift(0.);
   const RightHandSide<T> b{ q, 1. / this->scale, true };

@@ -71,7 +71,7 @@ struct DiffusionMedium
   Grid grid;
   const T* D = nullptr;       ///< length; >= 0, 0 is a wall
   const T* sigma_a = nullptr; ///< 1/length; >= 0; null for none
-  /** Voxels with a value other than 0 are no part of the domain; may be null. */
+  /** Voxels with a value other than 0 are no part of the domain; may be null. q must be 0 there. */
   const std::uint8_t* outside = nullptr;
   Boundary boundary = Boundary::Robin;
   double refractiveIndexRatio = 1.; ///< of Robin; 1/3 .. 3 is usual
@@ -281,7 +281,8 @@ private:
     DiffusionReport& report);
   /**
    * Where all sources are of one sign, so is the exact answer: what is of the other one beyond
-   * the tolerance or 1e-7 (of the largest |phi|) becomes 0, and the solve goes on from there.
+   * the tolerance or 1e-7 (of the largest |phi|) becomes 0, and the solve goes on from there,
+   * where it was not at its end: then the residual is told again.
    */
   template <class T>
   void keepSign(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
@@ -299,6 +300,11 @@ private:
   template <class T>
   double norm(const RightHandSide<T>& b) const;
   bool isZero(const double* phi) const;
+  /** The mask of what the solver works on; null for none. */
+  const std::uint8_t* outsideOfDomain() const;
+  /** False, with BadInput, where a source lies outside the domain. */
+  template <class T>
+  bool startsInside(const T* q, DiffusionReport& report) const;
   template <class T>
   void balance(const T* q, const double* phi, DiffusionReport& report) const;
   /** Of stepExplicit (c dt = step) and, where `local`, of stepLocal (step = courant). */

@@ -428,6 +428,81 @@ void layers(Suite& suite)
   LT_CHECK(suite, solved >= 57);
 }
 
+/** What ends before it is solved is no less honest: signs, residual, reason. */
+void early(Suite& suite)
+{
+  std::mt19937 random(21);
+  std::cout << "seed 21\n";
+  std::uniform_real_distribution<double> uniform(0., 1.);
+  DiffusionScene scene({ { 11, 12, 13 } }, { { 1., 1., 1. } });
+  for (std::size_t i = 0; i < scene.q.size(); ++i)
+  {
+    scene.D[i] = std::pow(10., -6. * uniform(random));
+    scene.sigma_a[i] = 1e-3;
+  }
+  scene.q[index(scene, 2, 3, 4)] = 1.;
+  DiffusionSolver solver;
+  solver.setMedium(scene.medium());
+  bool negative = false;
+  for (const double sign : { 1., -1. })
+  {
+    scene.q[index(scene, 2, 3, 4)] = sign;
+    for (int iterations = 1; iterations < 12; ++iterations)
+    {
+      DiffusionControl control;
+      control.maxIterations = iterations;
+      std::fill(scene.phi.begin(), scene.phi.end(), 0.);
+      const DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+      double wrong = 0.;
+      double largest = 0.;
+      bool dark = false;
+      for (const double phi : scene.phi)
+      {
+        wrong = std::max(wrong, -sign * phi);
+        largest = std::max(largest, sign * phi);
+        dark = dark || phi == 0.;
+      }
+      negative = negative || dark; // was made 0
+      LT_CHECK(suite, report.reason == StopReason::MaxIterations);
+      LT_CHECK(suite, wrong <= 1e-8 * largest);
+      LT_CHECK_CLOSE(suite, report.residual, scene.residual(), 1e-6);
+    }
+  }
+  LT_CHECK(suite, negative);
+
+  // steps whose solves do not end are not "all made"
+  DiffusionControl control;
+  control.maxIterations = 2;
+  std::fill(scene.phi.begin(), scene.phi.end(), 0.);
+  DiffusionReport report = solver.stepImplicit(
+    scene.q.data(), scene.phi.data(), 3, 1e4 * solver.positivityBound(), control);
+  LT_CHECK(suite, report.reason == StopReason::Breakdown);
+  LT_CHECK(suite, report.message.find("step 1 of 3") != std::string::npos);
+
+  // outside the domain nothing starts, and nothing is left from before
+  std::vector<std::uint8_t> outside(scene.q.size(), 0);
+  outside[index(scene, 5, 6, 7)] = 1;
+  DiffusionMedium<double> medium = scene.medium();
+  medium.outside = outside.data();
+  solver.setMedium(medium);
+  control.maxIterations = 100;
+  std::fill(scene.phi.begin(), scene.phi.end(), 3.);
+  report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged);
+  LT_CHECK(suite, scene.phi[index(scene, 5, 6, 7)] == 0.);
+  scene.q[index(scene, 5, 6, 7)] = 2.;
+  const auto refused = [&](const DiffusionReport& answer)
+  {
+    LT_CHECK(suite, answer.reason == StopReason::BadInput);
+    LT_CHECK(suite, answer.message.find("(5, 6, 7), outside") != std::string::npos);
+  };
+  refused(solver.solveSteady(scene.q.data(), scene.phi.data(), control));
+  refused(solver.stepLocal(scene.q.data(), scene.phi.data(), 3, 1., control));
+  refused(solver.stepImplicit(scene.q.data(), scene.phi.data(), 3, 1., control));
+  refused(
+    solver.stepExplicit(scene.q.data(), scene.phi.data(), 3, solver.positivityBound(), control));
+}
+
 /**
  * Steps of media so easy that a solve's first step leaves nothing but rounding. The recomputed
  * residual then has parts along that step's direction: a next one as long as if it had none never
@@ -511,6 +586,7 @@ int main(int argc, char* argv[])
   signs(suite);
   honest(suite);
   layers(suite);
+  early(suite);
   easySteps(suite);
   notFinite(suite);
   hardMedia(suite);
