@@ -926,8 +926,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     {
       this->UsedCoarseningFactor = factor;
       DiffusionReport first = kept.coarse->solve(q, phi.data(), control, started && chosen);
-      const bool stuck = first.reason == lighttransport::StopReason::MaxIterations ||
-        first.reason == lighttransport::StopReason::NoSteadyState;
+      const bool stuck = first.reason != lighttransport::StopReason::Converged &&
+        first.reason != lighttransport::StopReason::Cancelled;
       if (!chosen || !stuck || (this->TimeBudget > 0. && timeLeft() < 2. * setupSeconds))
       {
         return first;
@@ -935,6 +935,10 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       // Where cells of two voxels do not do, the full grid goes on from what they have reached.
       this->UsedCoarseningFactor = 1;
       kept.coarse.reset();
+      if (first.reason != lighttransport::StopReason::MaxIterations)
+      {
+        std::fill(phi.data(), phi.data() + size, 0.);
+      }
       if (!setUpFull())
       {
         first.reason = lighttransport::StopReason::BadInput;
@@ -1026,7 +1030,10 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
   const bool stepsDone = this->Mode != Steady && this->StopReason == MaxIterations &&
     (this->Mode == Explicit || report.message.empty());
-  const bool asAsked = stepsDone || (this->TimeBudget > 0. && this->EstimatedError >= 0.);
+  // a coarser grid's answer has an estimated error instead of the tolerance
+  const bool asAsked = stepsDone ||
+    ((this->TimeBudget > 0. || (coarse && !chosen && this->TargetError == 0.)) &&
+      this->EstimatedError >= 0.);
   if (this->StopReason == Breakdown || (this->StopReason == MaxIterations && !asAsked))
   {
     vtkWarningMacro(<< this->GetStopReasonAsString() << " after " << this->NumberOfIterationsUsed

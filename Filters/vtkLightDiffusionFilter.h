@@ -294,7 +294,7 @@ public:
    * follow. Fluence is on the input's grid, GetEstimatedError against its answer. 2: errors of a
    * percent in a fraction of the time and half the memory; 4: a preview, tens of percent.
    * Not with KeepSolutions or ActiveRegion, which it overrules; Residual is that before the last
-   * correction.
+   * correction, and the stop reason MaxIterations unless that, or TargetError, is met.
    */
   vtkSetMacro(CoarseningFactor, int);
   vtkGetMacro(CoarseningFactor, int);

@@ -58,6 +58,10 @@ ActiveRegion<T>::ActiveRegion(const DiffusionMedium<T>& what, double threshold)
 template <class T>
 double ActiveRegion<T>::step(std::int64_t i, std::int64_t j, int d) const
 {
+  if (!this->open(i) || !this->open(j))
+  {
+    return std::numeric_limits<double>::infinity();
+  }
   const double a = static_cast<double>(this->medium.D[i]);
   const double b = static_cast<double>(this->medium.D[j]);
   const double sigma = this->medium.sigma_a ? static_cast<double>(this->medium.sigma_a[j]) : 0.;

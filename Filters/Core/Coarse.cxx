@@ -5,8 +5,10 @@
 #include "Core/Kernel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <sstream>
 #include <type_traits>
 
 namespace lighttransport
@@ -238,19 +240,24 @@ DiffusionReport CoarseDiffusion::setMedium(
   }
 
   std::vector<double> most(static_cast<std::size_t>(n[1]) * n[2]);
+  std::atomic<bool> walls{ medium.outside != nullptr };
   ForRows(this->parallelFor, static_cast<std::int64_t>(most.size()), this->fine.size(),
     [&](std::int64_t begin, std::int64_t end)
     {
       for (std::int64_t r = begin; r < end; ++r)
       {
         T m = T(0);
+        bool wall = false;
         for (std::int64_t i = r * n[0]; i < (r + 1) * n[0]; ++i)
         {
           m = medium.outside && medium.outside[i] ? m : std::max(m, medium.D[i]);
+          wall = wall || (!medium.outside && !(medium.D[i] > T(0)));
         }
         most[static_cast<std::size_t>(r)] = static_cast<double>(m);
+        walls = walls || wall;
       }
     });
+  this->anyWall = walls;
   this->largestD = *std::max_element(most.begin(), most.end());
   if (!(this->largestD > 0.))
   {
@@ -1071,6 +1078,74 @@ void CoarseDiffusion::relax(const Q* q, double* phi) const
   }
 }
 
+template <class T, class Q>
+bool CoarseDiffusion::escapes(
+  const DiffusionMedium<T>& medium, const Q* q, DiffusionReport& report) const
+{
+  const std::array<int, 3>& n = this->fine.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  const auto open = [&](std::int64_t i)
+  { return !(medium.outside && medium.outside[i]) && medium.D[i] > T(0); };
+  std::vector<std::uint8_t> seen(static_cast<std::size_t>(this->fine.size()), 0);
+  for (std::int64_t seed = 0; seed < this->fine.size(); ++seed)
+  {
+    if (q[seed] == Q(0) || seen[static_cast<std::size_t>(seed)] ||
+      (medium.outside && medium.outside[seed]))
+    {
+      continue;
+    }
+    // Flood the seed's part until a sink is met, or what another flood has seen: that had one.
+    double sum = 0.;
+    double magnitude = 0.;
+    bool sink = false;
+    const std::uint8_t mark = 1;
+    const std::uint8_t own = 2;
+    std::vector<std::int64_t> visited(1, seed);
+    seen[static_cast<std::size_t>(seed)] = own;
+    for (std::size_t next = 0; next < visited.size() && !sink; ++next)
+    {
+      const std::int64_t i = visited[next];
+      sum += static_cast<double>(q[i]);
+      magnitude += std::abs(static_cast<double>(q[i]));
+      sink = medium.sigma_a && static_cast<double>(medium.sigma_a[i]) > 1e-30 * this->scale;
+      const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>((i / n[0]) % n[1]),
+        static_cast<int>(i / stride[2]) };
+      for (int d = 0; d < 3 && open(i) && !sink; ++d)
+      {
+        for (int side = -1; side <= 1; side += 2)
+        {
+          const std::int64_t j = i + side * stride[d];
+          if (at[d] + side < 0 || at[d] + side >= n[d])
+          {
+            sink = sink || (n[d] > 1 && medium.boundary != Boundary::ZeroFlux);
+          }
+          else if (open(j) && seen[static_cast<std::size_t>(j)] != own)
+          {
+            sink = sink || seen[static_cast<std::size_t>(j)] == mark;
+            seen[static_cast<std::size_t>(j)] = own;
+            visited.push_back(j);
+          }
+        }
+      }
+    }
+    for (const std::int64_t i : visited)
+    {
+      seen[static_cast<std::size_t>(i)] = mark;
+    }
+    if (!sink && std::abs(sum) > 1e-6 * magnitude)
+    {
+      std::ostringstream text;
+      text << "no steady state: in the closed part around voxel (" << seed % n[0] << ", "
+           << (seed / n[0]) % n[1] << ", " << seed / stride[2]
+           << ") light is neither absorbed nor can it escape";
+      report.reason = StopReason::NoSteadyState;
+      report.message = text.str();
+      return false;
+    }
+  }
+  return true;
+}
+
 //------------------------------------------------------------------------------
 template <class Q>
 DiffusionReport CoarseDiffusion::solve(
@@ -1092,6 +1167,14 @@ DiffusionReport CoarseDiffusion::solve(
   own.maxIterations = control.maxIterations;
   own.progress = control.progress;
   DiffusionReport report;
+  if (this->anyWall &&
+    !(this->floatMedium.D ? this->escapes(this->floatMedium, q, report)
+                          : this->escapes(this->doubleMedium, q, report)))
+  {
+    std::fill(phi, phi + size, 0.);
+    report.seconds = now() - began;
+    return report;
+  }
   const auto solveCells = [&](double tolerance)
   {
     own.tolerance = tolerance;
@@ -1204,28 +1287,66 @@ DiffusionReport CoarseDiffusion::solve(
     report.estimatedError = report.estimatedErrorL2 = 1.;
     report.message = "the time budget is used up before the error could be estimated: 1 is a guess";
   }
+  const int nx = this->fine.dims[0];
+  struct Row
+  {
+    double power = 0., sum = 0., magnitude = 0.;
+  };
+  std::vector<Row> rows(static_cast<std::size_t>(size / nx));
+  ForRows(this->parallelFor, size / nx, size,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        Row& row = rows[static_cast<std::size_t>(r)];
+        for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
+        {
+          const double value = static_cast<double>(q[i]);
+          row.power += value * value;
+          row.sum += value;
+          row.magnitude += std::abs(value);
+        }
+      }
+    });
+  Row all;
+  for (const Row& row : rows)
+  {
+    all.power += row.power;
+    all.sum += row.sum;
+    all.magnitude += row.magnitude;
+  }
+  const double power = all.power;
+  // Corrections overshoot: what sources of one sign cannot make, and what is outside, is dark.
+  const bool above = all.sum > 0. && all.sum >= all.magnitude;
+  const bool below = all.sum < 0. && -all.sum >= all.magnitude;
+  const std::uint8_t* outside =
+    this->floatMedium.D ? this->floatMedium.outside : this->doubleMedium.outside;
+  if (above || below || outside)
+  {
+    ForRows(this->parallelFor, size / nx, size,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t i = begin * nx; i < end * nx; ++i)
+        {
+          const bool wrong = (above && phi[i] < 0.) || (below && phi[i] > 0.);
+          phi[i] = wrong || (outside && outside[i]) ? 0. : phi[i];
+        }
+      });
+  }
+  report.residual = power > 0. ? report.residual / std::sqrt(power) : 0.;
   if (whole && report.reason != StopReason::Cancelled)
   {
-    const bool reached = !named || report.estimatedError <= enough;
+    // Three corrections are no promise: only an error that is named and met is.
+    const bool reached =
+      named ? report.estimatedError <= enough : report.residual <= control.tolerance;
     report.reason =
       reached && report.message.empty() ? StopReason::Converged : StopReason::MaxIterations;
     if (!reached && report.message.empty())
     {
-      report.message = "the coarse grid's corrections do not reach the error that was named";
+      report.message = named ? "the coarse grid's corrections do not reach the error that was named"
+                             : "a coarse grid's answer, see the estimated error";
     }
   }
-  const int nx = this->fine.dims[0];
-  const double power = SumRows(this->parallelFor, size / nx, size,
-    [&](std::int64_t r)
-    {
-      double sum = 0.;
-      for (std::int64_t i = r * nx; i < (r + 1) * nx; ++i)
-      {
-        sum += static_cast<double>(q[i]) * static_cast<double>(q[i]);
-      }
-      return sum;
-    });
-  report.residual = power > 0. ? report.residual / std::sqrt(power) : 0.;
   this->balance(q, phi, report);
   report.bytes += this->bytes();
   report.seconds = now() - began;

@@ -49,8 +49,9 @@ public:
    * phi: in, with fromPhi, the start; out, the answer reached. Without a named error or a time
    * budget, three corrections are made. The report's estimated errors are against the full grid's
    * answer, its powers the full grid's; its residual is that of the full grid's equations before
-   * the last correction. MaxIterations where the corrections do not reach control.targetError:
-   * phi is then the best so far.
+   * the last correction. MaxIterations where the corrections do not reach control.targetError, or,
+   * without one, control.tolerance: phi is then the best so far. phi keeps the sign of sources that
+   * have but one.
    */
   template <class Q>
   DiffusionReport solve(
@@ -101,6 +102,9 @@ private:
   Change compare(const double* before, const double* phi) const;
   template <class Q>
   void balance(const Q* q, const double* phi, DiffusionReport& report) const;
+  /** False, with NoSteadyState, where walls close light in that a cell would let out. */
+  template <class T, class Q>
+  bool escapes(const DiffusionMedium<T>& medium, const Q* q, DiffusionReport& report) const;
   template <class Q>
   void restrict(const Q* q, double* b) const;
 
@@ -108,6 +112,7 @@ private:
   Grid fine, coarse;
   std::array<int, 3> factors{ { 1, 1, 1 } };
   bool hasty = false;
+  bool anyWall = false;
   int shift = 0; // of factors[0], a power of 2 as all
   DiffusionMedium<float> floatMedium;
   DiffusionMedium<double> doubleMedium;
