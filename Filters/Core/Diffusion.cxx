@@ -197,6 +197,19 @@ LIGHTTRANSPORT_INLINE void rightHandSide(int n, const T* LIGHTTRANSPORT_RESTRICT
   }
 }
 
+LIGHTTRANSPORT_SIMD
+void rightHandSideRow(int n, const float* q, double scale, double mean, const float* a,
+  const float* b, const double* previous, double* to)
+{
+  rightHandSide(n, q, scale, mean, a, b, previous, to);
+}
+LIGHTTRANSPORT_SIMD
+void rightHandSideRow(int n, const double* q, double scale, double mean, const float* a,
+  const float* b, const double* previous, double* to)
+{
+  rightHandSide(n, q, scale, mean, a, b, previous, to);
+}
+
 /** to = (b - y) factor, returns the sum of squares of b - y; to may be null. */
 LIGHTTRANSPORT_SIMD
 double subtract(int n, const double* LIGHTTRANSPORT_RESTRICT b,
@@ -300,18 +313,87 @@ void combine(std::int64_t n, float beta, const float* LIGHTTRANSPORT_RESTRICT z,
   }
 }
 
-/** y += factor H(a, b) (x - other), H the harmonic mean: faces in double. */
-LIGHTTRANSPORT_SIMD
-void addFaces(int n, double factor, const double* LIGHTTRANSPORT_RESTRICT a,
-  const double* LIGHTTRANSPORT_RESTRICT b, const double* x, const double* other,
-  double* LIGHTTRANSPORT_RESTRICT y)
+/** H(a, b), the harmonic mean of what is >= 0. */
+LIGHTTRANSPORT_INLINE double harmonic(double a, double b)
 {
   constexpr double least = std::numeric_limits<double>::min();
+  const double sum = a + b;
+  return 2. * a * (b / (sum > least ? sum : least));
+}
+
+/** The medium, and phi = x, in a row and its neighbours; where there is none, the row itself. */
+template <class T>
+struct ExactRow
+{
+  const T *D, *DS, *DN, *DB, *DT;
+  const double *x, *xS, *xN, *xB, *xT;
+  double fx, fy, fz;  ///< 1 / (scale spacing^2)
+  bool before, after; ///< whether there are voxels beside the row's first and last
+};
+
+/** y += A x of n voxels, but for sigma_a and the border; all in double. */
+template <class T>
+LIGHTTRANSPORT_INLINE void exactFacesOf(
+  int n, const ExactRow<T>& row, double* LIGHTTRANSPORT_RESTRICT y)
+{
+  const T *D = row.D, *DS = row.DS, *DN = row.DN, *DB = row.DB, *DT = row.DT;
+  const double *x = row.x, *xS = row.xS, *xN = row.xN, *xB = row.xB, *xT = row.xT;
+  const double fx = row.fx;
+  const double fy = row.fy;
+  const double fz = row.fz;
   for (int i = 0; i < n; ++i)
   {
-    const double sum = a[i] + b[i];
-    y[i] += factor * (2. * a[i] * (b[i] / (sum > least ? sum : least))) * (x[i] - other[i]);
+    const double d = static_cast<double>(D[i]);
+    const double c = x[i];
+    y[i] += fy *
+        (harmonic(d, static_cast<double>(DS[i])) * (c - xS[i]) +
+          harmonic(d, static_cast<double>(DN[i])) * (c - xN[i])) +
+      fz *
+        (harmonic(d, static_cast<double>(DB[i])) * (c - xB[i]) +
+          harmonic(d, static_cast<double>(DT[i])) * (c - xT[i]));
   }
+  for (int i = row.before ? 0 : 1; i < n; ++i)
+  {
+    y[i] +=
+      fx * harmonic(static_cast<double>(D[i]), static_cast<double>(D[i - 1])) * (x[i] - x[i - 1]);
+  }
+  const int last = row.after ? n : n - 1;
+  for (int i = 0; i < last; ++i)
+  {
+    y[i] +=
+      fx * harmonic(static_cast<double>(D[i]), static_cast<double>(D[i + 1])) * (x[i] - x[i + 1]);
+  }
+}
+LIGHTTRANSPORT_SIMD
+void addExactFaces(int n, const ExactRow<float>& row, double* y)
+{
+  exactFacesOf(n, row, y);
+}
+LIGHTTRANSPORT_SIMD
+void addExactFaces(int n, const ExactRow<double>& row, double* y)
+{
+  exactFacesOf(n, row, y);
+}
+
+/** y = factor sigma x */
+template <class T>
+LIGHTTRANSPORT_INLINE void absorbedOf(int n, double factor, const T* LIGHTTRANSPORT_RESTRICT sigma,
+  const double* LIGHTTRANSPORT_RESTRICT x, double* LIGHTTRANSPORT_RESTRICT y)
+{
+  for (int i = 0; i < n; ++i)
+  {
+    y[i] = static_cast<double>(sigma[i]) * factor * x[i];
+  }
+}
+LIGHTTRANSPORT_SIMD
+void absorbedRow(int n, double factor, const float* sigma, const double* x, double* y)
+{
+  absorbedOf(n, factor, sigma, x, y);
+}
+LIGHTTRANSPORT_SIMD
+void absorbedRow(int n, double factor, const double* sigma, const double* x, double* y)
+{
+  absorbedOf(n, factor, sigma, x, y);
 }
 
 /** g = factor H(a, b), H the harmonic mean in double */
@@ -1147,7 +1229,7 @@ void DiffusionSolver::forgetFaces()
 template <class T>
 void DiffusionSolver::RightHandSide<T>::row(std::int64_t o, int n, double* to) const
 {
-  rightHandSide(n, this->q ? this->q + o : nullptr, this->qScale, this->mean,
+  rightHandSideRow(n, this->q ? this->q + o : nullptr, this->qScale, this->mean,
     this->previous ? this->shifted + o : nullptr, this->previous ? this->unshifted + o : nullptr,
     this->previous ? this->previous + o : nullptr, to);
 }
@@ -1179,62 +1261,58 @@ void DiffusionSolver::applyExactly(const DiffusionMedium<T>& medium, const doubl
   const int at[3] = { static_cast<int>(o - row * dims[0]), static_cast<int>(row % dims[1]),
     static_cast<int>(row / dims[1]) };
   const double inverse = 1. / this->scale;
-  static thread_local std::vector<double> store;
-  store.resize(2 * static_cast<std::size_t>(n + 2));
-  double* own = store.data() + 1;
-  double* other = own + n + 2;
-  const auto load = [&](std::int64_t from, int first, int last, double* to)
+  const bool before = at[0] > 0;
+  const bool after = at[0] + n < dims[0];
+  // rows of D: itself, south, north, below, above
+  const std::int64_t to[5] = { 0, at[1] > 0 ? -stride[1] : 0, at[1] + 1 < dims[1] ? stride[1] : 0,
+    at[2] > 0 ? -stride[2] : 0, at[2] + 1 < dims[2] ? stride[2] : 0 };
+  const T* D[5];
+  static thread_local std::vector<T> store;
+  const std::size_t pitch = static_cast<std::size_t>(n) + 2;
+  store.resize(medium.outside ? 5 * pitch : 0);
+  for (std::size_t r = 0; r < 5; ++r)
   {
-    for (int i = first; i < last; ++i)
+    D[r] = medium.D + o + to[r];
+    if (medium.outside)
     {
-      const std::int64_t v = from + i;
-      to[i] = medium.outside && medium.outside[v] ? 0. : static_cast<double>(medium.D[v]);
+      T* masked = store.data() + r * pitch + 1; // 0 outside
+      for (int i = before ? -1 : 0; i < (after ? n + 1 : n); ++i)
+      {
+        masked[i] = medium.outside[o + to[r] + i] ? T(0) : D[r][i];
+      }
+      D[r] = masked;
     }
-  };
-  // the row's own D, and one more on either side where there is one
-  const int before = at[0] > 0 ? 1 : 0;
-  const int after = at[0] + n < dims[0] ? 1 : 0;
-  load(o, -before, n + after, own);
-  for (int i = 0; i < n; ++i)
-  {
-    const std::int64_t v = o + i;
-    const bool absorbs = medium.sigma_a && !(medium.outside && medium.outside[v]);
-    y[i] = absorbs ? static_cast<double>(medium.sigma_a[v]) * inverse * phi[v] : 0.;
   }
   const double* x = phi + o;
-  for (int d = 0; d < 3; ++d)
+  if (medium.sigma_a && !medium.outside)
   {
-    if (dims[d] == 1)
+    absorbedRow(n, inverse, medium.sigma_a + o, x, y);
+  }
+  else
+  {
+    for (int i = 0; i < n; ++i)
     {
-      continue;
+      const bool absorbs = medium.sigma_a && !medium.outside[o + i]; // elsewhere it may be anything
+      y[i] = absorbs ? static_cast<double>(medium.sigma_a[o + i]) * inverse * x[i] : 0.;
     }
-    const double factor = inverse / (h[d] * h[d]);
-    for (int side = -1; side <= 1; side += 2)
+  }
+  addExactFaces(n,
+    ExactRow<T>{ D[0], D[1], D[2], D[3], D[4], x, x + to[1], x + to[2], x + to[3], x + to[4],
+      inverse / (h[0] * h[0]), inverse / (h[1] * h[1]), inverse / (h[2] * h[2]), before, after },
+    y);
+  for (int d = 0; d < 3 && medium.boundary != Boundary::ZeroFlux; ++d)
+  {
+    for (int side = 0; side < 2 && dims[d] > 1; ++side)
     {
-      if (d == 0)
-      {
-        const int first = side < 0 ? 1 - before : 0;
-        const int last = side < 0 ? n : n - 1 + after;
-        addFaces(last - first, factor, own + first, own + first + side, x + first, x + first + side,
-          y + first);
-      }
-      else if (at[d] + side >= 0 && at[d] + side < dims[d])
-      {
-        load(o + side * stride[d], 0, n, other);
-        addFaces(n, factor, own, other, x, x + side * stride[d], y);
-      }
-      if (medium.boundary == Boundary::ZeroFlux)
-      {
-        continue;
-      }
-      const int edge = side < 0 ? 0 : dims[d] - 1;
+      const int edge = side ? dims[d] - 1 : 0;
       const int first = d == 0 ? edge - at[0] : 0;
       const int last = d == 0 ? first + 1 : n;
       if (d == 0 ? first >= 0 && first < n : at[d] == edge)
       {
         for (int i = first; i < last; ++i)
         {
-          y[i] += own[i] / (0.5 * h[d] + this->twoA * own[i]) / h[d] * inverse * x[i];
+          const double own = static_cast<double>(D[0][i]);
+          y[i] += own / (0.5 * h[d] + this->twoA * own) / h[d] * inverse * x[i];
         }
       }
     }
