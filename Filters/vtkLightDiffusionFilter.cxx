@@ -1050,6 +1050,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     text << "the fluence reaches " << extreme
          << ", which float cannot hold; expected OutputPrecision = DOUBLE_PRECISION, or less power";
     problem = text.str();
+    this->StopReason = NotFinite; // as a float
     return false;
   }
   output->ShallowCopy(input);

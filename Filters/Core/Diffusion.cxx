@@ -30,6 +30,12 @@ constexpr float NoSink = 1e-30f;
 constexpr std::int64_t FirstRegion = 32768;
 constexpr std::int64_t FirstPart = 128;
 
+/** Where nothing can change, a step is no longer than this allows: NoSink does not show in it. */
+constexpr double NoDiagonal = 1e-10;
+
+/** Of the power that is emitted, what may leave an active region through its rim. */
+constexpr double MostLeaked = 1e-2;
+
 /** Explicit steps on so many values go through the memory together, where nobody need be asked. */
 constexpr std::int64_t SeveralStepsFrom = std::int64_t(1) << 19;
 constexpr std::int64_t AskedInTimeUpTo = std::int64_t(1) << 24;
@@ -1084,14 +1090,12 @@ std::int64_t DiffusionSolver::borderIndex(int d, const int at[3]) const
 //------------------------------------------------------------------------------
 double DiffusionSolver::positivityBound() const
 {
-  return this->largestDiagonal > 0. ? 1. / (this->scale * this->largestDiagonal * SumInFloat)
-                                    : std::numeric_limits<double>::max();
+  return 1. / (this->scale * std::max(this->largestDiagonal * SumInFloat, NoDiagonal));
 }
 
 double DiffusionSolver::stabilityBound() const
 {
-  return this->gershgorin > 0. ? 2. / (this->scale * this->gershgorin * SumInFloat)
-                               : std::numeric_limits<double>::max();
+  return 2. / (this->scale * std::max(this->gershgorin * SumInFloat, NoDiagonal));
 }
 
 //------------------------------------------------------------------------------
@@ -2511,7 +2515,20 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
     const bool ended = region.advance(std::max(first, region.lit()));
     if ((complete && !region.grown()) || late)
     {
-      return finish(fraction);
+      // Light that decays slowly, or not at all, may leave through a rim that looks dark.
+      const double magnitude = this->box.voxelVolume() *
+        SumEachRow(this->A, this->parallelFor,
+          [&](std::int64_t, std::int64_t o, int n)
+          {
+            double sum = 0.;
+            for (std::int64_t i = o; i < o + n; ++i)
+            {
+              sum += std::abs(static_cast<double>(source[i]));
+            }
+            return sum;
+          });
+      return late || std::abs(report.leaked) <= MostLeaked * magnitude ? finish(fraction)
+                                                                       : wholeVolume();
     }
     // Measured: regions become two or three times what is expected early on.
     if (rim.expected > 0.4 * quarter)

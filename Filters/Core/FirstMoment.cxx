@@ -459,11 +459,12 @@ FirstMomentSolver::Sums FirstMomentSolver::stepPhi(const T* q, double* phi)
         {
           const std::int64_t i = r * nx + x;
           const double loss = static_cast<double>(this->sigma_a[i]) * phi[i];
-          const double change = (q ? static_cast<double>(q[i]) : 0.) - loss - out[x];
+          const double gain = (q ? static_cast<double>(q[i]) : 0.) - out[x];
+          const double change = gain - loss;
           const double mean = static_cast<double>(this->weight[i]) * change; // over the step
           phi[i] += this->cdt * mean;
           sums.rate2 += change * change;
-          sums.absorbed += loss + (change - mean);
+          sums.absorbed += gain - mean; // not from the loss, of which a long step leaves nothing
           sums.stored += mean;
         }
       }

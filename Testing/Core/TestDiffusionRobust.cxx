@@ -479,6 +479,58 @@ void early(Suite& suite)
   LT_CHECK(suite, report.reason == StopReason::Breakdown);
   LT_CHECK(suite, report.message.find("step 1 of 3") != std::string::npos);
 
+  // A region's rim is no sink: light that hardly decays on its way is not solved where it starts,
+  // and light in a closed room has no steady state there either.
+  for (const double absorption : { 0., 1e-5 })
+  {
+    DiffusionScene corridor({ { 1, 600, 1 } }, { { 1., 1., 1. } });
+    corridor.boundary = Boundary::ZeroFlux;
+    corridor.D[590] = absorption > 0. ? .5 : 0.;
+    corridor.sigma_a.assign(corridor.q.size(), absorption);
+    corridor.sigma_a[599] = 1.;
+    corridor.q[20] = 1.;
+    DiffusionSolver active;
+    DiffusionControl all;
+    report =
+      active.solveActive(corridor.medium(), corridor.q.data(), corridor.phi.data(), all, 1e-3);
+    LT_CHECK(suite,
+      report.reason == (absorption > 0. ? StopReason::Converged : StopReason::NoSteadyState));
+    LT_CHECK(suite, std::abs(report.leaked) <= 1e-2);
+    LT_CHECK_CLOSE(suite, report.absorbed + report.leaked, absorption > 0. ? 1. : 0., 1e-6);
+  }
+
+  // a first-moment step in which nearly all light is absorbed still says how much
+  {
+    DiffusionScene dense({ { 8, 1, 1 } }, { { 1., 1., 1. } });
+    dense.boundary = Boundary::ZeroFlux;
+    for (std::size_t i = 0; i < 8; ++i)
+    {
+      dense.D[i] = i % 2 ? 1. : 1e-9;
+      dense.sigma_a[i] = 1. / (3. * dense.D[i]);
+      dense.phi[i] = 1.;
+    }
+    FirstMomentSolver moment;
+    moment.setMedium(dense.medium());
+    const double cdt = 1e5 * moment.courantBound();
+    LT_CHECK(suite, moment.stabilityBound() > cdt);
+    const FirstMomentReport powers =
+      moment.step(static_cast<const double*>(nullptr), dense.phi.data(), 3, cdt, control);
+    LT_CHECK_CLOSE(suite, powers.storedEnergy, -8., 1e-4);
+    LT_CHECK_CLOSE(suite, powers.absorbedEnergy, -powers.storedEnergy, 1e-9);
+  }
+
+  // where nothing can change, steps change nothing
+  DiffusionScene lone({ { 1, 1, 1 } }, { { 1., 1., 1. } });
+  lone.boundary = Boundary::ZeroFlux;
+  DiffusionSolver of;
+  of.setMedium(lone.medium());
+  for (const double cdt : { of.positivityBound(), of.stabilityBound() })
+  {
+    lone.phi[0] = 2.;
+    of.stepExplicit(static_cast<const double*>(nullptr), lone.phi.data(), 9, cdt, control);
+    LT_CHECK_CLOSE(suite, lone.phi[0], 2., 1e-12);
+  }
+
   // outside the domain nothing starts, and nothing is left from before
   std::vector<std::uint8_t> outside(scene.q.size(), 0);
   outside[index(scene, 5, 6, 7)] = 1;

@@ -255,6 +255,7 @@ void types(Suite& suite)
       return floats.Get();
     }(),
     "float", "DOUBLE_PRECISION");
+  LT_CHECK(suite, floats->GetStopReason() == Filter::NotFinite);
   floats->SetOutputPrecision(vtkAlgorithm::DOUBLE_PRECISION);
   floats->Update();
   LT_CHECK(suite, fluenceAt(floats, 2, 2, 2) > 1e58 && std::isfinite(fluenceAt(floats, 2, 2, 2)));
