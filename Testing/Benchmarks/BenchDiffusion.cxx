@@ -4,19 +4,24 @@
  * The diffusion solver against its floor and its competitors, all in one run and
  * in turn, so that their quotients mean something on a busy machine.
  *
- *   bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256] [--media 1,2,3]
+ *   bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256,384,512] [--media 1,2,3]
  *     [--threads 1,2] [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]
- *     [--error-size 128] [--large] [--quick]
+ *     [--error-size 128] [--limit 1500] [--quick]
  *
  * Prints tables of Markdown and leaves the same numbers as CSV in FOLDER:
- *   floor  STREAM's triad; what share of it the explicit step and a Jacobi sweep reach
+ *   floor  STREAM's triad; what share of it the explicit step and a Jacobi sweep reach;
+ *          touch: what memory fresh from the system costs
  *   step   one explicit step, beside table 4.1 of the source thesis
- *   error  the true error against time, for every knob that trades them
- *   solve  the steady solve at growing sizes: this solver, hypre, Eigen, OpenVDB, Jacobi
- *   constant  of these, the medium that is the same everywhere alone (solve has it up to 256^3)
- * --large adds 384^3 (and 512^3 for this solver alone) with at most 3 repeats;
- * --quick is a smoke test: tiny sizes, once. Times are medians of the repeats, quotients
- * are medians of each repeat's own. Exits with 1 if this solver misses the
+ *   error  the true error against time, for the tolerances of this solver and of hypre
+ *          (bench-frugal --sections knobs has the filter's other knobs)
+ *   solve  the steady solve at growing sizes: this solver, hypre, Eigen, OpenVDB, Jacobi;
+ *          media 1 and 2 are issue 3's two columns, 3 is the same everywhere (up to 384^3).
+ *          runs: each single run, as it comes; summary: against hypre
+ * The solvers take turns within a repeat. Beyond 256^3 at most 3 repeats, and 1 on fewer than the
+ * most threads; solvers that take long have as many as fit into a minute. What would not fit into
+ * memory, that minute, or --limit seconds from the start on (0: no limit) is not run, and the row
+ * says what it would take. --quick is a smoke test: tiny sizes, once. Times are medians of the
+ * repeats, quotients are medians of each repeat's own. Exits with 1 if this solver misses the
  * tolerance anywhere, whatever the times are. bench-diffusion.sh builds, runs, and draws.
  */
 #include "DiffusionCompetitors.h"
@@ -41,6 +46,10 @@
 #if defined(__GLIBC__)
 #include <malloc.h>
 #endif
+#ifdef BENCH_MPIEXEC
+#include <sys/mman.h>
+#include <unistd.h>
+#endif
 
 using namespace lighttransport;
 using namespace lighttransport::benchmark;
@@ -50,7 +59,7 @@ namespace
 struct Options
 {
   std::string output = "bench-diffusion";
-  std::vector<int> sizes{ 32, 64, 96, 128, 256 };
+  std::vector<int> sizes{ 32, 64, 96, 128, 256, 384, 512 };
   std::vector<int> media{ 1, 2, 3 };
   std::vector<int> threads{ 1, 2 };
   std::vector<int> stepSizes{ 128, 256, 512 };
@@ -60,9 +69,11 @@ struct Options
   int errorSize = 128;
   double tolerance = 1e-6;
   std::int64_t triadLength = 32 << 20;
-  int largestHypre = 384;
+  std::size_t touched = std::size_t(800) << 20; ///< bytes, what a solve at 256^3 takes
+  double limit = 1500.;                         ///< seconds
   bool quick = false;
   std::string folderOfProgram;
+  double began = 0.;
 
   int most() const { return *std::max_element(this->threads.begin(), this->threads.end()); }
   bool has(const char* section) const
@@ -76,6 +87,12 @@ const MediumRecipe Recipes[] = { { 1e4, .99 }, { 1e6, .999 } };
 double now()
 {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/** To standard error, with the seconds since the start. */
+void say(const Options& options, const std::string& what)
+{
+  std::fprintf(stderr, "%6.0f s  %s\n", now() - options.began, what.c_str());
 }
 
 /** Of this process, all threads together. */
@@ -156,7 +173,21 @@ std::string number(double value, const char* format)
   return value != value || value < 0. ? "" : text;
 }
 
-/** Comma-separated values, each line on disk at once. */
+std::string Quoted(const std::string& text)
+{
+  return '"' + text + '"';
+}
+
+/** Three digits. */
+std::string Seconds(double value)
+{
+  return number(value, "%.3g");
+}
+
+/**
+ * Comma-separated values, each line on disk at once. What is unknown (negative, not a number) is
+ * left empty. Texts that may hold a comma: Quoted().
+ */
 class Table
 {
 public:
@@ -168,14 +199,16 @@ public:
   template <class... Values>
   void add(const Values&... values)
   {
-    std::ostringstream line;
-    line.precision(9);
     const char* comma = "";
-    ((line << comma << values, comma = ","), ...);
-    this->file << line.str() << std::endl;
+    ((this->file << comma << field(values), comma = ","), ...);
+    this->file << std::endl;
   }
 
 private:
+  static std::string field(double value) { return number(value, "%.9g"); }
+  static std::string field(int value) { return std::to_string(value); }
+  static std::string field(std::size_t value) { return std::to_string(value); }
+  static std::string field(const std::string& value) { return value; }
   std::ofstream file;
 };
 
@@ -261,6 +294,28 @@ Run SolveOursTwice(const Problem& problem, double tolerance, int threads, std::v
   return run;
 }
 
+#ifdef BENCH_MPIEXEC
+/** A file in memory that other processes may open by its path, and that goes with this one. */
+class MemoryFile
+{
+public:
+  MemoryFile()
+    : descriptor(memfd_create("bench-diffusion", 0))
+  {
+  }
+  ~MemoryFile() { close(this->descriptor); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  std::string path() const
+  {
+    return "/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(this->descriptor);
+  }
+
+private:
+  int descriptor;
+};
+#endif
+
 /** hypre's in a process of its own, since it needs MPI to use two cores. */
 class Hypre
 {
@@ -268,20 +323,20 @@ public:
   Hypre(const Options& o, const Problem& problem)
     : options(o)
   {
-    this->path = o.output + "/problem.tmp";
-    std::ofstream file(this->path, std::ios::binary);
+#ifdef BENCH_MPIEXEC
+    std::ofstream out(this->file.path(), std::ios::binary);
     const std::int32_t header[4] = { problem.grid.dims[0], problem.grid.dims[1],
       problem.grid.dims[2], static_cast<std::int32_t>(problem.boundary) };
-    file.write(reinterpret_cast<const char*>(header), sizeof header);
+    out.write(reinterpret_cast<const char*>(header), sizeof header);
     for (const std::vector<float>* values : { &problem.D, &problem.sigma_a, &problem.q })
     {
-      file.write(reinterpret_cast<const char*>(values->data()),
+      out.write(reinterpret_cast<const char*>(values->data()),
         static_cast<std::streamsize>(values->size() * sizeof(float)));
     }
+#else
+    (void)problem;
+#endif
   }
-  ~Hypre() { std::remove(this->path.c_str()); }
-  Hypre(const Hypre&) = delete;
-  Hypre& operator=(const Hypre&) = delete;
 
   static bool available()
   {
@@ -297,13 +352,13 @@ public:
   {
     Run run;
 #ifdef BENCH_MPIEXEC
-    const std::string solution = this->path + ".solution";
+    const MemoryFile solution;
     std::ostringstream command;
     command << BENCH_MPIEXEC << " " << ranks << " '" << this->options.folderOfProgram
-            << "bench-diffusion-hypre' '" << this->path << "' " << kind << " " << tolerance;
+            << "bench-diffusion-hypre' " << this->file.path() << " " << kind << " " << tolerance;
     if (phi)
     {
-      command << " '" << solution << "'";
+      command << " " << solution.path();
     }
     FILE* pipe = popen(command.str().c_str(), "r");
     char line[256] = "";
@@ -311,23 +366,24 @@ public:
       std::sscanf(line, "%lf %lf %lf %d %lf %lf %lf", &run.assemble, &run.setup, &run.solve,
         &run.iterations, &run.bytes, &run.cpu, &run.again) != 7)
     {
+      run = Run();
       run.failure = "no answer from bench-diffusion-hypre";
     }
     if (pipe && pclose(pipe) != 0)
     {
+      run = Run();
       run.failure = "bench-diffusion-hypre failed";
     }
     if (phi && run.failure.empty())
     {
-      std::ifstream file(solution, std::ios::binary);
-      file.read(reinterpret_cast<char*>(phi->data()),
+      std::ifstream in(solution.path(), std::ios::binary);
+      in.read(reinterpret_cast<char*>(phi->data()),
         static_cast<std::streamsize>(phi->size() * sizeof(double)));
-      if (!file)
+      if (!in)
       {
         run.failure = "no solution from bench-diffusion-hypre";
       }
     }
-    std::remove(solution.c_str());
 #else
     (void)kind, (void)tolerance, (void)ranks, (void)phi;
     run.failure = "built without hypre";
@@ -337,7 +393,9 @@ public:
 
 private:
   const Options& options;
-  std::string path;
+#ifdef BENCH_MPIEXEC
+  MemoryFile file;
+#endif
 };
 
 /** 200 sweeps from zero; the time is the sweeps' alone. */
@@ -459,6 +517,42 @@ double MeasureFloor(const Options& options)
   return result;
 }
 
+/** What memory costs that the system has to find first. */
+void MeasureTouch(const Options& options)
+{
+  Table csv(options, "touch", "pages,threads,repeat,bytes,seconds,seconds_again");
+  const int threads = options.most();
+  const ParallelFor parallelFor = OnThreads(threads);
+  std::printf("\n### Fresh memory\n\n"
+              "Writing to %.0f MB that the system has just lent, given back, and lent again, and "
+              "writing to them once more, on %d threads. A virtual machine whose free memory its "
+              "host takes back pays in the first column; that is most of the "
+              "difference between \"s\" and \"again\" below.\n\n"
+              "| pages | first write, s: each repeat | second write, s: median |\n|---|---|---|\n",
+    1e-6 * static_cast<double>(options.touched), threads);
+  const std::pair<TouchedPages, const char*> kinds[] = { { TouchedPages::Small, "small (4 KiB)" },
+    { TouchedPages::Large, "large, as the solver asks for" },
+    { TouchedPages::Populated, "large, all at once (MADV_POPULATE_WRITE)" } };
+  std::vector<std::string> first(std::size(kinds));
+  std::vector<std::vector<double>> second(std::size(kinds));
+  for (int i = 0; i < options.repeat; ++i)
+  {
+    for (std::size_t k = 0; k < std::size(kinds); ++k)
+    {
+      const auto [seconds, again] = TouchSeconds(options.touched, kinds[k].first, parallelFor);
+      first[k] += (i ? ", " : "") + (seconds < 0. ? "not here" : number(seconds, "%.3f"));
+      second[k].push_back(again);
+      csv.add(Quoted(kinds[k].second), threads, i, options.touched, seconds, again);
+    }
+  }
+  for (std::size_t k = 0; k < std::size(kinds); ++k)
+  {
+    std::printf("| %s | %s | %s |\n", kinds[k].second, first[k].c_str(),
+      number(median(second[k]), "%.3f").c_str());
+  }
+  std::fflush(stdout);
+}
+
 //------------------------------------------------------------------------------
 void MeasureSteps(const Options& options)
 {
@@ -552,7 +646,6 @@ void MeasureErrors(const Options& options)
       std::printf(
         "| %s | reference | reached only %.1e | | | | | | | |\n", problem.name.c_str(), reached);
     }
-    // Further knobs (grid, region, precision) are further entries here.
     std::vector<Knob> knobs;
     knobs.push_back({ "tolerance", { 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10 },
       [&](const Problem& p, double value, std::vector<double>& phi)
@@ -571,11 +664,17 @@ void MeasureErrors(const Options& options)
       std::vector<double> phi(problem.q.size());
       for (int i = 0; i < options.repeat; ++i)
       {
+        say(options,
+          "error, " + problem.name + ": " + knob.name + ", repeat " + std::to_string(i + 1));
         for (std::size_t v = 0; v < knob.values.size(); ++v)
         {
           std::fill(phi.begin(), phi.end(), 0.);
           const double cpuBegan = CpuSeconds();
           last[v] = knob.solve(problem, knob.values[v], phi);
+          if (!last[v].failure.empty())
+          {
+            continue;
+          }
           seconds[v].push_back(last[v].seconds());
           cpu[v].push_back(last[v].cpu < 0. ? CpuSeconds() - cpuBegan : last[v].cpu);
           if (i + 1 == options.repeat)
@@ -588,14 +687,21 @@ void MeasureErrors(const Options& options)
       for (std::size_t v = 0; v < knob.values.size(); ++v)
       {
         const Run& run = last[v];
+        if (seconds[v].empty())
+        {
+          std::printf("| %s | %s | %.0e | failed: %s | | | | | | |\n", problem.name.c_str(),
+            knob.name.c_str(), knob.values[v], run.failure.c_str());
+          continue;
+        }
         const double s = median(seconds[v]);
         const double bytes = run.bytes / static_cast<double>(problem.grid.size());
-        std::printf("| %s | %s | %.0e | %.3f | %.3f | %d | %.1e | %.1e | %.1e | %.0f %s|\n",
-          problem.name.c_str(), knob.name.c_str(), knob.values[v], s, median(cpu[v]),
-          run.iterations, run.residual, run.errors.p95, run.errors.relativeL2, bytes,
-          run.failure.empty() ? "" : (run.failure + " ").c_str());
-        csv.add('"' + problem.name + '"', knob.name, knob.values[v], n, threads, s, median(cpu[v]),
-          run.iterations, run.residual, run.errors.p95, run.errors.relativeL2, bytes);
+        std::printf("| %s | %s | %.0e | %s | %s | %d | %.1e | %.1e | %.1e | %.0f %s|\n",
+          problem.name.c_str(), knob.name.c_str(), knob.values[v], Seconds(s).c_str(),
+          Seconds(median(cpu[v])).c_str(), run.iterations, run.residual, run.errors.p95,
+          run.errors.relativeL2, bytes, run.failure.empty() ? "" : (run.failure + " ").c_str());
+        csv.add(Quoted(problem.name), Quoted(knob.name), knob.values[v], n, threads, s,
+          median(cpu[v]), run.iterations, run.residual, run.errors.p95, run.errors.relativeL2,
+          bytes);
       }
       std::fflush(stdout);
     }
@@ -603,165 +709,308 @@ void MeasureErrors(const Options& options)
 }
 
 //------------------------------------------------------------------------------
+/** A solver on so many threads, and what it did at one size. */
 struct Entry
 {
   std::string solver;
   int threads;
+  /** By which power of the size the time grows: 4 where iterations do too. */
+  double power;
   /** phi holds the solution if the run says so by a true `judge`. */
   std::function<Run(std::vector<double>& phi, bool judge)> solve;
+  int repeat = 1;
+  std::string left; ///< why there is no run, or fewer than wanted
   std::vector<Run> runs;
 
-  std::vector<double> seconds() const
+  /** Of the runs that came to an end. */
+  std::vector<double> all(const std::function<double(const Run&)>& value) const
   {
-    std::vector<double> s;
+    std::vector<double> values;
     for (const Run& run : this->runs)
     {
-      s.push_back(run.seconds());
+      if (run.failure.empty())
+      {
+        values.push_back(value(run));
+      }
     }
-    return s;
+    return values;
+  }
+  std::vector<double> seconds() const
+  {
+    return this->all([](const Run& run) { return run.seconds(); });
   }
   double again() const
   {
-    std::vector<double> s;
-    for (const Run& run : this->runs)
-    {
-      s.push_back(run.again);
-    }
-    return median(s);
+    return median(this->all([](const Run& run) { return run.again; }));
   }
   double cpu() const
   {
-    std::vector<double> s;
-    for (const Run& run : this->runs)
-    {
-      s.push_back(run.cpu);
-    }
-    return median(s);
+    return median(this->all([](const Run& run) { return run.cpu; }));
   }
+};
+
+/** What a run took at a smaller size, to tell what it will take at the next. */
+struct Cost
+{
+  int size = 0;
+  double seconds = 0.; ///< all of it, with what does not count as the solver's time
+  double bytes = 0.;   ///< per voxel
 };
 
 /** HPGMG's count for a full multigrid solve, and the bytes of an application in float. */
 constexpr double FloorApplications = 13.;
 constexpr double FloorBytes = 24.; // 3 faces, sink, x in, y out
 
+/** For solvers that are here for comparison alone. */
+constexpr double Patience = 60.;
+
+const char* const Ours = "lighttransport";
+const char* const Theirs = "hypre PCG+PFMG";
+
+/** This solver on so many threads against hypre's PFMG on at most so many ranks. */
+void Summarise(const Problem& problem, const std::vector<Entry>& entries, int threads, double triad,
+  double resident, Table& csv, std::ostringstream& summary)
+{
+  const auto mine = std::find_if(entries.begin(), entries.end(),
+    [threads](const Entry& e) { return e.solver == Ours && e.threads == threads; });
+  if (mine == entries.end() || mine->seconds().empty())
+  {
+    return;
+  }
+  // In each repeat this solver ran right beside hypre's.
+  std::vector<double> quotients;
+  std::vector<double> againQuotients;
+  std::vector<double> cpuQuotients;
+  for (std::size_t i = 0; i < mine->runs.size(); ++i)
+  {
+    double theirs = 1e300;
+    double theirAgain = 1e300;
+    double theirCpu = 1e300;
+    double myCpu = 1e300;
+    for (const Entry& entry : entries)
+    {
+      if (entry.threads > threads || i >= entry.runs.size() || !entry.runs[i].failure.empty())
+      {
+        continue;
+      }
+      const Run& run = entry.runs[i];
+      if (entry.solver == Theirs)
+      {
+        theirs = std::min(theirs, run.seconds());
+        theirAgain = std::min(theirAgain, run.again);
+        theirCpu = std::min(theirCpu, run.cpu);
+      }
+      if (entry.solver == Ours)
+      {
+        myCpu = std::min(myCpu, run.cpu);
+      }
+    }
+    const Run& run = mine->runs[i];
+    if (theirs < 1e300 && run.failure.empty())
+    {
+      quotients.push_back(theirs / run.seconds());
+      againQuotients.push_back(theirAgain / run.again);
+      cpuQuotients.push_back(theirCpu / myCpu);
+    }
+  }
+  const int n = problem.grid.dims[0];
+  const double voxels = static_cast<double>(problem.grid.size());
+  const double s = median(mine->seconds());
+  const double again = mine->again();
+  const double floor = triad > 0. ? FloorApplications * FloorBytes * voxels / triad : -1.;
+  const Run& run = mine->runs.back();
+  char line[400];
+  std::snprintf(line, sizeof line,
+    "| %d³ | %s | %d | %zu | %s | %s | %s | %s | %s | %d | %.0f | %s | %s | %.0f | %s | %.0f "
+    "| %.0f |\n",
+    n, problem.name.c_str(), threads, mine->runs.size(), Seconds(s).c_str(),
+    number(median(quotients), "%.2f").c_str(), Seconds(again).c_str(),
+    number(median(againQuotients), "%.2f").c_str(), number(median(cpuQuotients), "%.2f").c_str(),
+    run.iterations, run.applications, Seconds(floor).c_str(),
+    floor > 0. ? number(again / floor, "%.1f").c_str() : "", run.bytes / voxels,
+    number(resident, "%.0f").c_str(), 1e9 * s / voxels, 1e9 * again / voxels);
+  summary << line;
+  csv.add(n, Quoted(problem.name), threads, mine->runs.size(), s, median(quotients), again,
+    median(againQuotients), median(cpuQuotients), run.iterations, run.applications, floor,
+    run.bytes / voxels, resident);
+}
+
+/** The solvers of a problem; hypre is filled in later, if any of its entries is to run. */
+std::vector<Entry> MakeEntries(
+  const Options& options, const Problem& problem, const std::unique_ptr<Hypre>& hypre)
+{
+  const double tolerance = options.tolerance;
+  const int most = options.most();
+  const int n = problem.grid.dims[0];
+  std::vector<Entry> entries;
+  const auto add = [&entries](const char* solver, int threads, double power,
+                     std::function<Run(std::vector<double>&, bool)> solve) {
+    entries.push_back({ solver, threads, power, std::move(solve), 1, "", {} });
+  };
+  for (const int t : options.threads)
+  {
+    add(Ours, t, 3.,
+      [&problem, tolerance, t](std::vector<double>& phi, bool)
+      { return SolveOursTwice(problem, tolerance, t, phi); });
+    if (Hypre::available() && !problem.constant)
+    {
+      add(Theirs, t, 3.,
+        [&hypre, tolerance, t](std::vector<double>& phi, bool judge)
+        { return hypre->solve("pfmg", tolerance, t, judge ? &phi : nullptr); });
+    }
+  }
+  if (Hypre::available() && !problem.constant)
+  {
+    add("hypre PCG+BoomerAMG", most, 3.,
+      [&hypre, tolerance, most](std::vector<double>& phi, bool judge)
+      { return hypre->solve("boomeramg", tolerance, most, judge ? &phi : nullptr); });
+  }
+  if (problem.constant)
+  {
+    add("lighttransport, iterating", most, 3.,
+      [&problem, tolerance, most](std::vector<double>& phi, bool)
+      { return SolveOurs(problem, tolerance, most, phi, true); });
+  }
+#ifdef BENCH_WITH_EIGEN
+  if (!problem.constant)
+  {
+    add("Eigen CG+IC", 1, 4.,
+      [&problem, tolerance](std::vector<double>& phi, bool)
+      { return SolveEigen(problem, tolerance, phi); });
+  }
+#endif
+#ifdef BENCH_WITH_OPENVDB
+  if (problem.constant)
+  {
+    add("OpenVDB poisson", most, 4.,
+      [&problem, tolerance, most](std::vector<double>& phi, bool)
+      { return SolveOpenVDB(problem, tolerance, most, phi); });
+  }
+#endif
+  if (n <= 128 && !problem.constant) // what it shows is its error
+  {
+    add("200 Jacobi sweeps", most, 3.,
+      [&problem, most](std::vector<double>& phi, bool) { return SolveJacobi(problem, most, phi); });
+  }
+  return entries;
+}
+
 /** False if this solver has not kept its promise somewhere. */
 bool MeasureSolves(const Options& options, double triad)
 {
   Table csv(options, "solve",
     "medium,size,solver,threads,seconds,seconds_min,seconds_max,again,cpu_seconds,assemble,setup,"
-    "solve,"
-    "iterations,applications,bytes_per_voxel,resident_per_voxel,residual,p95,relative_l2,repeats");
+    "solve,iterations,applications,bytes_per_voxel,resident_per_voxel,residual,p95,relative_l2,"
+    "repeats,remark");
+  Table runsCsv(options, "runs",
+    "medium,size,solver,threads,repeat,setup,solve,again,cpu_seconds,assemble,iterations,failure");
+  Table summaryCsv(options, "summary",
+    "size,medium,threads,repeats,seconds,times_faster,again,again_times_faster,cpu_times_faster,"
+    "iterations,applications,floor,bytes_per_voxel,resident_per_voxel");
   std::printf(
     "\n## The steady solve, relative residual %.0e\n\n"
     "s: set-up + solve (hypre's and Eigen's filling of the matrix, OpenVDB's of the tree are not "
     "in it; D to phi for this solver), in memory that is fresh from the system; again: the same in "
-    "a heap that a solve before it has left. Residual: |q - A phi| / |q| in double by the same "
-    "function "
-    "for all (OpenVDB stops by the maximum norm, the others by this one). Bytes beyond the input, "
-    "phi included: as the solver tells (hypre: resident). "
-    "Errors as above.\n\n"
-    "| size | medium | solver | threads | s | min - max | again, s | CPU s | assembly | iterations "
-    "| fine applications | residual | L2 | p95 | bytes / voxel | ns / voxel | again |\n"
-    "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-    options.tolerance);
+    "a heap that a solve before it has left; medians of so many repeats. Residual: "
+    "|q - A phi| / |q| in double by the same function for all (OpenVDB stops by the maximum norm, "
+    "the others by this one). Bytes beyond the input, phi included: as the solver tells (hypre: "
+    "resident). Errors as above. Not run: what would take more than %.0f s or --limit, or more "
+    "memory than there is, told from the size before: times grow by the third power of the size, "
+    "where iterations grow too (Eigen, OpenVDB) by the fourth.\n\n"
+    "| size | medium | solver | threads | repeats | s | min - max | again, s | CPU s | assembly | "
+    "iterations | fine applications | residual | L2 | p95 | bytes / voxel | ns / voxel | again |\n"
+    "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    options.tolerance, Patience);
   std::ostringstream summary;
+  std::map<std::string, Cost> costs;
   bool kept = true;
   const int threads = options.most();
   const ParallelFor parallelFor = OnThreads(threads);
   for (const int n : options.sizes)
   {
-    std::vector<MediumRecipe> recipes;
     for (const int medium : options.media)
     {
-      if (medium < 3 && options.has("solve"))
+      if (medium == 3 && n > 384)
       {
-        recipes.push_back(Recipes[medium - 1]);
+        continue;
       }
-      else if (medium == 3 && (n <= 256 || options.has("constant")))
-      {
-        recipes.push_back({ 0., 0. });
-      }
-    }
-    for (const MediumRecipe& recipe : recipes)
-    {
+      const MediumRecipe recipe = medium == 3 ? MediumRecipe{ 0., 0. } : Recipes[medium - 1];
       const Problem problem = MakeProblem(n, recipe, parallelFor);
       const double voxels = static_cast<double>(problem.grid.size());
-      const int repeat = n > 300 ? std::min(3, options.repeat) : options.repeat;
+      const std::string title = std::to_string(n) + "³, " + problem.name;
       std::vector<double> reference;
       if (n <= 128)
       {
         double reached = 0.;
         reference = ReferenceSolution(problem, reached, parallelFor);
       }
+      std::vector<double> phi(problem.q.size());
 
-      const double tolerance = options.tolerance;
-      std::vector<Entry> entries;
-      for (const int t : options.threads)
-      {
-        entries.push_back({ "lighttransport", t,
-          [&, t](std::vector<double>& phi, bool)
-          { return SolveOursTwice(problem, tolerance, t, phi); },
-          {} });
-      }
-      if (problem.constant)
-      {
-        entries.push_back({ "lighttransport, iterating", threads,
-          [&](std::vector<double>& phi, bool)
-          { return SolveOurs(problem, tolerance, threads, phi, true); },
-          {} });
-      }
       std::unique_ptr<Hypre> hypre;
-      if (Hypre::available() && n <= options.largestHypre && !problem.constant)
+      std::vector<Entry> entries = MakeEntries(options, problem, hypre);
+      const double available = 1024. * fromProc("/proc/meminfo", "MemAvailable");
+      int repeat = 0;
+      bool needsHypre = false;
+      const auto costOf = [&](const Entry& entry) -> Cost&
+      { return costs[entry.solver + std::to_string(entry.threads) + problem.name]; };
+      const auto expected = [&](const Entry& entry)
+      {
+        const Cost& cost = costOf(entry);
+        return cost.size ? cost.seconds * std::pow(1. * n / cost.size, entry.power) : 0.;
+      };
+      for (Entry& entry : entries)
+      {
+        const bool main = entry.solver == Ours || entry.solver == Theirs;
+        const double seconds = expected(entry);
+        // and the answer twice, where another process gives it
+        const double bytes = costOf(entry).size ? (costOf(entry).bytes + 16.) * voxels : 0.;
+        const int wanted =
+          n <= 256 ? options.repeat : std::min(entry.threads < threads ? 1 : 3, options.repeat);
+        entry.repeat =
+          main ? wanted : std::min(wanted, static_cast<int>(Patience / std::max(1e-3, seconds)));
+        char text[100] = "";
+        if (available > 0. && bytes > 0.95 * available)
+        {
+          std::snprintf(text, sizeof text, "not run: would take %.0f GB of memory", 1e-9 * bytes);
+        }
+        else if (entry.repeat == 0)
+        {
+          std::snprintf(text, sizeof text, "not run: would take about %.0f s", seconds);
+        }
+        entry.left = text;
+        entry.repeat = *text ? 0 : entry.repeat;
+        repeat = std::max(repeat, entry.repeat);
+        needsHypre = needsHypre || (entry.repeat && entry.solver.compare(0, 5, "hypre") == 0);
+      }
+      if (needsHypre)
       {
         hypre.reset(new Hypre(options, problem));
-        for (const int t : options.threads)
-        {
-          entries.push_back({ "hypre PCG+PFMG", t,
-            [&, t](std::vector<double>& phi, bool judge)
-            { return hypre->solve("pfmg", tolerance, t, judge ? &phi : nullptr); },
-            {} });
-        }
-        if (n == 128 || options.quick)
-        {
-          entries.push_back({ "hypre PCG+BoomerAMG", threads,
-            [&](std::vector<double>& phi, bool judge)
-            { return hypre->solve("boomeramg", tolerance, threads, judge ? &phi : nullptr); },
-            {} });
-        }
-      }
-#ifdef BENCH_WITH_EIGEN
-      if (n <= 96 && !problem.constant)
-      {
-        entries.push_back({ "Eigen CG+IC", 1,
-          [&](std::vector<double>& phi, bool) { return SolveEigen(problem, tolerance, phi); },
-          {} });
-      }
-#endif
-#ifdef BENCH_WITH_OPENVDB
-      if (problem.constant && n <= 128)
-      {
-        entries.push_back({ "OpenVDB poisson", threads,
-          [&](std::vector<double>& phi, bool)
-          { return SolveOpenVDB(problem, tolerance, threads, phi); },
-          {} });
-      }
-#endif
-      if (n <= 128 && !problem.constant)
-      {
-        entries.push_back({ "200 Jacobi sweeps", threads,
-          [&](std::vector<double>& phi, bool) { return SolveJacobi(problem, threads, phi); }, {} });
       }
 
-      std::vector<double> phi(problem.q.size());
       for (int i = 0; i < repeat; ++i)
       {
         for (Entry& entry : entries)
         {
-          const bool judge = i + 1 == repeat;
+          if (i >= entry.repeat)
+          {
+            continue;
+          }
+          if (options.limit > 0. && now() - options.began + expected(entry) > options.limit)
+          {
+            char text[100];
+            std::snprintf(text, sizeof text,
+              i ? "then --limit was reached" : "not run: would take about %.0f s, beyond --limit",
+              expected(entry));
+            entry.left = text;
+            entry.repeat = i;
+            continue;
+          }
           const double cpuBegan = CpuSeconds();
-          Run run = entry.solve(phi, judge);
+          const double began = now();
+          Run run = entry.solve(phi, i == 0);
+          const double wall = now() - began;
           run.cpu = run.cpu < 0. ? CpuSeconds() - cpuBegan : run.cpu;
-          if (judge && run.failure.empty())
+          if (run.failure.empty() && i == 0)
           {
             run.residual = Residual(problem, phi.data(), nullptr, parallelFor);
             if (!reference.empty())
@@ -769,111 +1018,87 @@ bool MeasureSolves(const Options& options, double triad)
               run.errors = FindErrors(phi.data(), reference);
             }
           }
+          if (run.failure.empty())
+          {
+            costOf(entry) = { n, wall, std::max(0., run.bytes) / voxels };
+          }
+          if (entry.solver != Ours && entry.solver != Theirs)
+          {
+            entry.repeat = std::min(entry.repeat, std::max(1, static_cast<int>(Patience / wall)));
+          }
+          say(options,
+            title + ", " + std::to_string(i + 1) + " of " + std::to_string(entry.repeat) + ": " +
+              entry.solver + " on " + std::to_string(entry.threads) + ": " +
+              (run.failure.empty() ? Seconds(run.seconds()) + " s" : "failed: " + run.failure));
+          runsCsv.add(Quoted(problem.name), n, Quoted(entry.solver), entry.threads, i, run.setup,
+            run.solve, run.again, run.cpu, run.assemble, run.iterations, Quoted(run.failure));
           entry.runs.push_back(run);
         }
       }
       const double resident = n > 256
         ? -1.
-        : (8. * voxels + PeakGrowth([&]() { SolveOurs(problem, tolerance, threads, phi); })) /
+        : (8. * voxels +
+            PeakGrowth([&]() { SolveOurs(problem, options.tolerance, threads, phi); })) /
           voxels;
 
       for (const Entry& entry : entries)
       {
-        const Run& run = entry.runs.back();
         const std::vector<double> s = entry.seconds();
+        std::string remark = entry.left;
+        if (s.size() < entry.runs.size())
+        {
+          const auto failed = std::find_if(entry.runs.begin(), entry.runs.end(),
+            [](const Run& run) { return !run.failure.empty(); });
+          remark = std::to_string(entry.runs.size() - s.size()) + " of " +
+            std::to_string(entry.runs.size()) + " failed: " + failed->failure;
+        }
+        kept = kept && !(entry.solver == Ours && s.size() < entry.runs.size());
+        if (s.empty())
+        {
+          std::printf("| %d³ | %s | %s | %d | 0 | %s | | | | | | | | | | | | |\n", n,
+            problem.name.c_str(), entry.solver.c_str(), entry.threads, remark.c_str());
+          csv.add(Quoted(problem.name), n, Quoted(entry.solver), entry.threads,
+            std::string(15, ',') + "0", Quoted(remark));
+          continue;
+        }
+        const Run& run = entry.runs.front(); // the one that was judged
         const double least = *std::min_element(s.begin(), s.end());
         const double most = *std::max_element(s.begin(), s.end());
-        const bool ours = entry.solver == "lighttransport";
-        kept = kept && !(ours && (!run.failure.empty() || !(run.residual <= 1.1 * tolerance)));
-        std::printf("| %d³ | %s | %s | %d | %.3f | %.3f - %.3f | %s | %.3f | %s | %d | %s | %s | "
-                    "%s | %s | %s "
-                    "| %.0f | %s |%s\n",
-          n, problem.name.c_str(), entry.solver.c_str(), entry.threads, median(s), least, most,
-          number(entry.again(), "%.3f").c_str(), entry.cpu(), number(run.assemble, "%.3f").c_str(),
-          run.iterations, number(run.applications, "%.0f").c_str(),
+        const bool ours = entry.solver == Ours;
+        kept = kept && !(ours && !(run.residual <= 1.1 * options.tolerance));
+        std::printf("| %d³ | %s | %s | %d | %zu | %s | %s - %s | %s | %s | %s | %d | %s | %s | "
+                    "%s | %s | %s | %.0f | %s |%s\n",
+          n, problem.name.c_str(), entry.solver.c_str(), entry.threads, s.size(),
+          Seconds(median(s)).c_str(), Seconds(least).c_str(), Seconds(most).c_str(),
+          Seconds(entry.again()).c_str(), Seconds(entry.cpu()).c_str(),
+          Seconds(run.assemble).c_str(), run.iterations, number(run.applications, "%.0f").c_str(),
           number(run.residual, "%.1e").c_str(), number(run.errors.relativeL2, "%.1e").c_str(),
           number(run.errors.p95, "%.1e").c_str(), number(run.bytes / voxels, "%.0f").c_str(),
           1e9 * median(s) / voxels, number(1e9 * entry.again() / voxels, "%.0f").c_str(),
-          run.failure.empty() ? "" : (" " + run.failure).c_str());
-        csv.add('"' + problem.name + '"', n, entry.solver, entry.threads, median(s), least, most,
-          entry.again(), entry.cpu(), run.assemble, run.setup, run.solve, run.iterations,
+          remark.empty() ? "" : (" " + remark).c_str());
+        csv.add(Quoted(problem.name), n, Quoted(entry.solver), entry.threads, median(s), least,
+          most, entry.again(), entry.cpu(), run.assemble, run.setup, run.solve, run.iterations,
           run.applications, run.bytes / voxels, ours && entry.threads == threads ? resident : -1.,
-          run.residual, run.errors.p95, run.errors.relativeL2, repeat);
+          run.residual, run.errors.p95, run.errors.relativeL2, s.size(), Quoted(remark));
       }
       std::fflush(stdout);
-
-      // In each repeat this solver ran right beside the best of hypre's.
-      std::vector<double> quotients;
-      std::vector<double> againQuotients;
-      std::vector<double> cpuQuotients;
-      std::vector<double> seconds;
-      std::vector<double> again;
-      int iterations = 0;
-      double applications = 0.;
-      double bytes = 0.;
-      for (int i = 0; i < repeat; ++i)
+      for (const int t : options.threads)
       {
-        double theirs = 1e300;
-        double theirAgain = 1e300;
-        double mine = 0.;
-        double myAgain = 0.;
-        double theirCpu = 1e300;
-        double myCpu = 1e300;
-        for (const Entry& entry : entries)
-        {
-          const Run& run = entry.runs[static_cast<std::size_t>(i)];
-          if (entry.solver == "hypre PCG+PFMG" && run.failure.empty())
-          {
-            theirs = std::min(theirs, run.seconds());
-            theirAgain = std::min(theirAgain, run.again);
-            theirCpu = std::min(theirCpu, run.cpu);
-          }
-          if (entry.solver == "lighttransport")
-          {
-            myCpu = std::min(myCpu, run.cpu);
-          }
-          if (entry.solver == "lighttransport" && entry.threads == threads)
-          {
-            mine = run.seconds();
-            myAgain = run.again;
-            iterations = run.iterations;
-            applications = run.applications;
-            bytes = run.bytes / voxels;
-          }
-        }
-        seconds.push_back(mine);
-        again.push_back(myAgain);
-        if (theirs < 1e300)
-        {
-          quotients.push_back(theirs / mine);
-          againQuotients.push_back(theirAgain / myAgain);
-          cpuQuotients.push_back(theirCpu / myCpu);
-        }
+        Summarise(problem, entries, t, t == threads ? triad : 0., t == threads ? resident : -1.,
+          summaryCsv, summary);
       }
-      char line[400];
-      const double floor = triad > 0. ? FloorApplications * FloorBytes * voxels / triad : -1.;
-      std::snprintf(line, sizeof line,
-        "| %d³ | %s | %.3f | %s | %.3f | %s | %s | %d | %.0f | %s | %s | %.0f | %s | %.0f | %.0f "
-        "|\n",
-        n, problem.name.c_str(), median(seconds), number(median(quotients), "%.2f").c_str(),
-        median(again), number(median(againQuotients), "%.2f").c_str(),
-        number(median(cpuQuotients), "%.2f").c_str(), iterations, applications,
-        number(floor, "%.4f").c_str(), number(median(again) / floor, "%.1f").c_str(), bytes,
-        number(resident, "%.0f").c_str(), 1e9 * median(seconds) / voxels,
-        1e9 * median(again) / voxels);
-      summary << line;
     }
   }
-  std::printf("\n### Summary: lighttransport on %d threads\n\n"
-              "times faster: than hypre's PCG+PFMG on its best number of ranks, median of each "
-              "repeat's quotient; in CPU seconds: the least of either's, which others' load "
-              "hardly touches. Floor: %.0f fine-grid operator applications (HPGMG) of %.0f "
-              "bytes per voxel at the triad's bandwidth.\n\n"
-              "| size | medium | s | times faster | again, s | times faster | in CPU s | "
-              "iterations | fine applications | floor, s | again, times the floor | "
+  std::printf("\n### Summary: lighttransport\n\n"
+              "times faster: than hypre's PCG+PFMG on its best number of ranks up to these "
+              "threads, median of each repeat's quotient; in CPU seconds: the least of either's, "
+              "which others' load hardly touches. Floor: %.0f fine-grid operator applications "
+              "(HPGMG) of %.0f bytes per voxel at the triad's bandwidth.\n\n"
+              "| size | medium | threads | repeats | s | times faster | again, s | times faster | "
+              "in CPU s | iterations | fine applications | floor, s | again, times the floor | "
               "bytes / voxel told | resident | ns / voxel | again |\n"
-              "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n%s",
-    threads, FloorApplications, FloorBytes, summary.str().c_str());
+              "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n%s",
+    FloorApplications, FloorBytes, summary.str().c_str());
   std::fflush(stdout);
   return kept;
 }
@@ -918,12 +1143,7 @@ bool Parse(int argc, char* argv[], Options& options)
       options.errorSize = 24;
       options.repeat = 1;
       options.triadLength = 1 << 20;
-      continue;
-    }
-    if (option == "--large")
-    {
-      options.sizes.push_back(384);
-      options.sizes.push_back(512);
+      options.touched = std::size_t(8) << 20;
       continue;
     }
     const char* value = i + 1 < argc ? argv[++i] : nullptr;
@@ -959,6 +1179,10 @@ bool Parse(int argc, char* argv[], Options& options)
     {
       options.errorSize = std::atoi(value);
     }
+    else if (option == "--limit")
+    {
+      options.limit = std::atof(value);
+    }
     else if (option == "--tolerance")
     {
       options.tolerance = std::atof(value);
@@ -981,12 +1205,14 @@ bool Parse(int argc, char* argv[], Options& options)
 int main(int argc, char* argv[])
 {
   Options options;
+  options.began = now();
   if (!Parse(argc, argv, options))
   {
     std::fprintf(stderr,
-      "usage: bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256] [--media 1,2,3]\n"
-      "  [--threads 1,2] [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]\n"
-      "  [--error-size 128] [--large] [--quick]        (sizes are 16 at least)\n");
+      "usage: bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256,384,512]\n"
+      "  [--media 1,2,3] [--threads 1,2] [--repeat 5] [--tolerance 1e-6]\n"
+      "  [--sections floor,step,error,solve] [--error-size 128] [--limit 1500] [--quick]\n"
+      "  (sizes are 16 at least; --limit in seconds, 0: none)\n");
     return 2;
   }
   std::filesystem::create_directories(options.output);
@@ -1008,7 +1234,8 @@ int main(int argc, char* argv[])
       break;
     }
   }
-  std::printf("# bench-diffusion\n\n%s; medians of %d; load average at the start: %s.\n",
+  std::printf("# bench-diffusion\n\n%s; medians of %d where nothing else is said; load average at "
+              "the start: %s.\n",
     cpu.c_str(), options.repeat, load().c_str());
   if (!Hypre::available())
   {
@@ -1022,21 +1249,25 @@ int main(int argc, char* argv[])
 #endif
   std::fflush(stdout);
 
-  const double triad = options.has("floor") ? MeasureFloor(options) : 0.;
+  double triad = 0.;
+  if (options.has("floor"))
+  {
+    say(options, "floor");
+    triad = MeasureFloor(options);
+    MeasureTouch(options);
+  }
   if (options.has("step"))
   {
+    say(options, "step");
     MeasureSteps(options);
   }
   if (options.has("error"))
   {
     MeasureErrors(options);
   }
-  bool kept = true;
-  if (options.has("solve") || options.has("constant"))
-  {
-    kept = MeasureSolves(options, triad);
-  }
-  std::printf("\nLoad average at the end: %s.\n", load().c_str());
+  const bool kept = !options.has("solve") || MeasureSolves(options, triad);
+  std::printf(
+    "\nAfter %.0f s; load average at the end: %s.\n", now() - options.began, load().c_str());
   if (!kept)
   {
     std::fprintf(stderr, "error: lighttransport missed the tolerance, see the table\n");

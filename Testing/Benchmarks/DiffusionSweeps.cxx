@@ -5,6 +5,11 @@
 #include "Core/Kernel.h"
 
 #include <chrono>
+#include <cstring>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace lighttransport
 {
@@ -137,6 +142,62 @@ void Jacobi::sweep(const ParallelFor& parallelFor)
       }
     });
   std::swap(this->from, this->to);
+}
+
+std::pair<double, double> TouchSeconds(
+  std::size_t bytes, TouchedPages pages, const ParallelFor& parallelFor)
+{
+  std::pair<double, double> seconds(-1., -1.);
+#if defined(__linux__)
+#if !defined(MADV_POPULATE_WRITE)
+  constexpr int MADV_POPULATE_WRITE = 23;
+#endif
+  constexpr std::size_t large = std::size_t(1) << 21;
+  auto began = std::chrono::steady_clock::now();
+  const auto passed = [&began]()
+  {
+    const auto now = std::chrono::steady_clock::now();
+    const double s = std::chrono::duration<double>(now - began).count();
+    began = now;
+    return s;
+  };
+  void* mapped =
+    mmap(nullptr, bytes + large, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (mapped == MAP_FAILED)
+  {
+    return seconds;
+  }
+  const std::size_t aside = large - reinterpret_cast<std::uintptr_t>(mapped) % large;
+  char* memory = static_cast<char*>(mapped) + aside;
+  if ((pages != TouchedPages::Small && madvise(memory, bytes, MADV_HUGEPAGE) != 0) ||
+    (pages == TouchedPages::Populated && madvise(memory, bytes, MADV_POPULATE_WRITE) != 0))
+  {
+    munmap(mapped, bytes + large);
+    return seconds;
+  }
+  const std::int64_t blocks = static_cast<std::int64_t>(bytes / large);
+  parallelFor(blocks,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (char* p = memory + begin * std::int64_t(large); p < memory + end * std::int64_t(large);
+           p += 4096)
+      {
+        *p = 1;
+      }
+    });
+  seconds.first = passed();
+  parallelFor(blocks,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      std::memset(
+        memory + begin * std::int64_t(large), 1, static_cast<std::size_t>(end - begin) * large);
+    });
+  seconds.second = passed();
+  munmap(mapped, bytes + large);
+#else
+  (void)bytes, (void)pages, (void)parallelFor;
+#endif
+  return seconds;
 }
 } // namespace benchmark
 } // namespace lighttransport

@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
-/** The yardsticks of bench-diffusion: STREAM's triad and a plain Jacobi sweep. */
+/** The yardsticks of bench-diffusion: STREAM's triad, a plain Jacobi sweep, fresh memory. */
 #ifndef DiffusionSweeps_h
 #define DiffusionSweeps_h
 
 #include "Core/Buffer.h"
 #include "DiffusionProblem.h"
+
+#include <utility>
 
 namespace lighttransport
 {
@@ -44,6 +46,20 @@ private:
   Buffer<float> from, to;
   Buffer<float> zeros;
 };
+
+enum class TouchedPages
+{
+  Small,
+  Large,    ///< MADV_HUGEPAGE, as the solver's buffers
+  Populated ///< and MADV_POPULATE_WRITE
+};
+
+/**
+ * Seconds to map so many bytes and write to each 4 KiB of them for the first time, and to write
+ * all of them once more; -1, -1 where the system does not offer that.
+ */
+std::pair<double, double> TouchSeconds(
+  std::size_t bytes, TouchedPages pages, const ParallelFor& parallelFor);
 } // namespace benchmark
 } // namespace lighttransport
 
