@@ -58,7 +58,7 @@ namespace
 {
 struct Options
 {
-  std::string output = "bench-diffusion";
+  std::string output; ///< "results" beside the folder of the program
   std::vector<int> sizes{ 32, 64, 96, 128, 256, 384, 512 };
   std::vector<int> media{ 1, 2, 3 };
   std::vector<int> threads{ 1, 2 };
@@ -525,9 +525,9 @@ void MeasureTouch(const Options& options)
   const ParallelFor parallelFor = OnThreads(threads);
   std::printf("\n### Fresh memory\n\n"
               "Writing to %.0f MB that the system has just lent, given back, and lent again, and "
-              "writing to them once more, on %d threads. A virtual machine whose free memory its "
-              "host takes back pays in the first column; that is most of the "
-              "difference between \"s\" and \"again\" below.\n\n"
+              "writing to them once more, on %d threads: about what a solve at 256³ takes. The "
+              "first write is part of its \"s\" below, not of its \"again\". A virtual machine "
+              "whose host takes free memory back may need a second for it.\n\n"
               "| pages | first write, s: each repeat | second write, s: median |\n|---|---|---|\n",
     1e-6 * static_cast<double>(options.touched), threads);
   const std::pair<TouchedPages, const char*> kinds[] = { { TouchedPages::Small, "small (4 KiB)" },
@@ -647,9 +647,10 @@ void MeasureErrors(const Options& options)
         "| %s | reference | reached only %.1e | | | | | | | |\n", problem.name.c_str(), reached);
     }
     std::vector<Knob> knobs;
-    knobs.push_back({ "tolerance", { 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10 },
-      [&](const Problem& p, double value, std::vector<double>& phi)
-      { return SolveOurs(p, value, threads, phi); } });
+    knobs.push_back(
+      { "tolerance of lighttransport", { 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10 },
+        [&](const Problem& p, double value, std::vector<double>& phi)
+        { return SolveOurs(p, value, threads, phi); } });
     if (Hypre::available())
     {
       knobs.push_back({ "tolerance of hypre PCG+PFMG", { 1e-2, 1e-4, 1e-6, 1e-8, 1e-10 },
@@ -1131,6 +1132,7 @@ bool Parse(int argc, char* argv[], Options& options)
   const std::string program = argv[0];
   const std::size_t slash = program.rfind('/');
   options.folderOfProgram = slash == std::string::npos ? "" : program.substr(0, slash + 1);
+  options.output = options.folderOfProgram + "../results";
   for (int i = 1; i < argc; ++i)
   {
     const std::string option = argv[i];
