@@ -15,7 +15,7 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
-from matplotlib.ticker import FuncFormatter, NullFormatter  # noqa: E402
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter  # noqa: E402
 
 # Okabe and Ito's colours, told apart by everyone; one per solver in all figures.
 COLOURS = {
@@ -89,9 +89,9 @@ def threads_of(count):
 
 
 def size_axis(axis, rows):
-    """Logarithmic; the numbers of sizes closer than a sixth of an octave would touch."""
     sizes = sorted({int(row["size"]) for row in rows})
     axis.set_xscale("log")
+    axis.set_xlim(sizes[0] / 1.15, sizes[-1] * 1.15)
     axis.set_xticks(sizes, [f"{size}³" for size in sizes], fontsize=8)
     axis.set_xticks([], minor=True)
     axis.set_xlabel("voxels")
@@ -175,6 +175,7 @@ def scaling():
                 )
         size_axis(axis, rows)
         axis.set_ylim(bottom=0)
+        axis.yaxis.set_major_locator(MaxNLocator(integer=True))
         axis.set_title(label, fontsize=9)
     axes[2].axhline(13, color="black", linewidth=0.8)
     axes[2].annotate(
@@ -214,8 +215,8 @@ def faster():
             "aim: 3", (0.01, 3), xycoords=("axes fraction", "data"), va="bottom", fontsize=7
         )
         size_axis(axis, rows)
-        axis.set_ylim(bottom=0)
         axis.set_title(medium, fontsize=9)
+    axes[0][0].set_ylim(bottom=0)
     axes[0][0].set_ylabel("times faster than hypre PCG+PFMG")
     handles = [Line2D([], [], color=colour, label=label) for colour, label in kinds.values()] + [
         Line2D([], [], color="black", linestyle=styles[c], label=threads_of(c)) for c in counts
