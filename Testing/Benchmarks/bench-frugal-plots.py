@@ -30,8 +30,9 @@ def draw_knobs(folder):
     scenes = sorted({row["scene"] for row in rows})
     if not scenes:
         return
-    figure, axes = plt.subplots(1, len(scenes), figsize=(3.4 * len(scenes), 3.2), sharey=True)
+    figure, axes = plt.subplots(1, len(scenes), figsize=(3.4 * len(scenes), 3.6), sharey=True)
     axes = [axes] if len(scenes) == 1 else axes
+    times = [1e3 * float(row["seconds"]) for row in rows]
     for axis, scene in zip(axes, scenes):
         for knob in sorted({row["knob"] for row in rows}):
             if knob in ("OutputPrecision", "ComputeFlux"):
@@ -42,15 +43,20 @@ def draw_knobs(folder):
                 [max(float(row["p95"]), 1e-8) for row in points],
                 marker="o", markersize=3, linewidth=1, label=knob)
         axis.set_title(scene, fontsize=8)
-        ticks = [25, 50, 100, 200, 400, 800]
+        ticks = [t for t in (1, 3, 10, 30, 100, 300, 1000, 3000) if min(times) < t < max(times)]
         axis.set_xticks(ticks, [str(tick) for tick in ticks])
         axis.xaxis.set_minor_formatter(NullFormatter())
-        axis.set_xlabel("ms", fontsize=8)
+        axis.set_xlabel("whole Update(), ms", fontsize=8)
         axis.tick_params(labelsize=7)
         axis.grid(True, which="major", linewidth=0.3)
     axes[0].set_ylabel("95th percentile of the relative error", fontsize=8)
-    axes[-1].legend(fontsize=6)
-    figure.tight_layout()
+    lines, names = axes[0].get_legend_handles_labels()
+    figure.legend(lines, names, loc="lower center", bbox_to_anchor=(0.5, 0.05), ncol=3, fontsize=7,
+                  frameon=False)
+    size = round(float(rows[0]["voxels"]) ** (1 / 3))
+    figure.text(0.01, 0.01, f"Each point a value of the knob; {size}³ voxels, two threads.",
+                fontsize=7)
+    figure.tight_layout(rect=(0, 0.15, 1, 1))
     figure.savefig(os.path.join(folder, "frugal-knobs.png"), dpi=90)
 
 
