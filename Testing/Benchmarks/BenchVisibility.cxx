@@ -3,9 +3,10 @@
 /**
  * Measures what Module/Documentation/visibility.md says:
  *
- *   bench-visibility FOLDER [--data FOLDER] [SECTION ...]
+ *   bench-visibility [FOLDER [--data FOLDER] [SECTION ...]]
  *
- * with the sections (all by default)
+ * leaving tables in FOLDER (Testing/Temporary of its build by default), with the sections (all by
+ * default)
  *   times    seconds by size, order and number of directions, beside casting a ray per voxel
  *            and direction (as the kernel of a ray caster would: single precision, trilinear,
  *            a step per voxel), timed on a part of the voxels; visibility-times.csv; and the
@@ -19,6 +20,7 @@
  *            visibility-edge.csv
  */
 #include "Core/Visibility.h"
+#include "LightTransportTesting.h"
 #include "VisibilityReference.h"
 
 #include "vtkDataArray.h"
@@ -710,7 +712,7 @@ void edge(const std::string& folder)
 
 int main(int argc, char* argv[])
 {
-  std::string folder = ".";
+  std::string folder = lighttransport::testing::temporaryFolder(argv[0]);
   std::string data;
   std::vector<std::string> sections;
   for (int i = 1; i < argc; ++i)

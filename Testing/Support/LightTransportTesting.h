@@ -17,6 +17,7 @@
 
 #include <cfenv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <string>
@@ -35,10 +36,21 @@ constexpr bool LookingForRaces = true;
 constexpr bool LookingForRaces = false;
 #endif
 
+/** Where a program leaves files that is not told where: in its build, never where it is called. */
+inline std::string temporaryFolder(const std::string& program)
+{
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path folder =
+    fs::absolute(program, error).parent_path().parent_path() / "Testing" / "Temporary";
+  return (fs::is_directory(folder, error) ? folder : fs::temp_directory_path(error)).string();
+}
+
 class Suite
 {
 public:
   Suite(int argc, char* argv[])
+    : temporary(temporaryFolder(argc > 0 ? argv[0] : ""))
   {
     for (int i = 1; i + 1 < argc; ++i)
     {
@@ -58,7 +70,7 @@ public:
     }
   }
 
-  std::string temporary = ".";
+  std::string temporary;
   std::string baselines = ".";
   std::string data;
 
