@@ -484,7 +484,8 @@ void WriteNiftiLabels(const std::string& path, const Volume& volume,
   put(112, 1.F);
   header[123] = 2; // mm
   put(124, 1.F);   // cal_max
-  std::memcpy(header + 148, description.data(), std::min<std::size_t>(description.size(), 79));
+  // 80 characters, the last of them 0
+  std::copy_n(description.begin(), std::min<std::size_t>(description.size(), 79), header + 148);
   const std::int16_t code = volume.IsRAS ? 1 : 2; // scanner, or aligned to something else
   put(252, code);
   put(254, code);

@@ -241,7 +241,7 @@ std::vector<double> ParseCamera(const std::string& name, const std::string& valu
       return view.second;
     }
   }
-  const std::vector<double> n = ToNumbers(value, ',');
+  std::vector<double> n = ToNumbers(value, ',');
   if (n.size() < 2 || n.size() > 3 || std::abs(n[1]) > 90. || (n.size() == 3 && !(n[2] > 0.)))
   {
     Refuse(name, value,

@@ -100,9 +100,10 @@ vtkSmartPointer<vtkImageData> makeVolume(int n, int type, bool holes = false)
   vtkDataArray* scalars = image->GetPointData()->GetScalars();
   for (vtkIdType i = 0; i < image->GetNumberOfPoints(); ++i)
   {
-    const double x = double(i % n) / n - .5;
-    const double y = double(i / n % n) / n - .5;
-    const double z = double(i / n / n) / n - .5;
+    const vtkIdType at[3] = { i % n, i / n % n, i / n / n };
+    const double x = double(at[0]) / n - .5;
+    const double y = double(at[1]) / n - .5;
+    const double z = double(at[2]) / n - .5;
     scalars->SetComponent(i, 0,
       100. - 90. * std::tanh(40. * (std::sqrt(x * x + y * y + z * z) - .3)) + uniform(random));
     if (holes && x < -1. / 6.)

@@ -34,6 +34,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <utility>
 #include <vector>
 
 using namespace lighttransport::testing;
@@ -76,7 +77,7 @@ struct View
 
   View(vtkSmartPointer<vtkGPUVolumeRayCastMapper> m, vtkImageData* image,
     vtkVolumeProperty* property, int pixels)
-    : mapper(m)
+    : mapper(std::move(m))
   {
     this->mapper->SetInputData(image);
     this->mapper->AutoAdjustSampleDistancesOff();

@@ -355,7 +355,8 @@ void flat(Suite& suite)
   Values plane;
   for (std::int64_t i = 0; i < grid.size(); ++i)
   {
-    plane.push_back(3. * 0.7 * double(i % 20) - 2.5 * double(i / (20 * 17)));
+    const std::int64_t k = i / (20 * 17);
+    plane.push_back(3. * 0.7 * double(i % 20) - 2.5 * double(k));
   }
   LT_CHECK_NEAR(suite, worst(curvatures(grid, plane, 1.)), 0., 1e-6);
   // Nothing but noise, of a known level: hardly a level set is seen in it.

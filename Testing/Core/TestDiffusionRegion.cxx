@@ -65,8 +65,7 @@ DiffusionReport compare(Suite& suite, const std::string& name, const DiffusionSc
   control.largestRegion = expected.largest;
   std::vector<double> phi(scene.q.size(), 3.); // what was there before does not matter
   DiffusionSolver solver;
-  const DiffusionReport report =
-    solver.solveActive(medium, scene.q.data(), phi.data(), control, 1e-7);
+  DiffusionReport report = solver.solveActive(medium, scene.q.data(), phi.data(), control, 1e-7);
   double power = 0.;
   for (const double q : scene.q)
   {

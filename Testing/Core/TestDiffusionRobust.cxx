@@ -398,10 +398,11 @@ void layers(Suite& suite)
     std::vector<std::uint8_t> outside(scene.q.size(), 0);
     for (std::size_t i = 0; i < outside.size(); ++i)
     {
+      const std::size_t row = i / static_cast<std::size_t>(n);
+      const std::size_t plane = row / static_cast<std::size_t>(n + 3);
       const double x = static_cast<double>(i % static_cast<std::size_t>(n)) / n;
-      const double y =
-        static_cast<double>(i / static_cast<std::size_t>(n) % static_cast<std::size_t>(n + 3)) / n;
-      const double z = static_cast<double>(i / static_cast<std::size_t>(n * (n + 3))) / n;
+      const double y = static_cast<double>(row % static_cast<std::size_t>(n + 3)) / n;
+      const double z = static_cast<double>(plane) / n;
       const double wave = std::sin(layer * (z + 0.1 * std::sin(5. * x) + 0.05 * y));
       scene.D[i] = wave > 0. ? contrast : 1.;
       scene.sigma_a[i] = (run % 2 == 0 ? 1e-7 : 1e-3) / scene.D[i];

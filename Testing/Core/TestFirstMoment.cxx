@@ -287,6 +287,8 @@ void isotropy(Suite& suite)
 /** Of the energy away from the lamp, the part that alternates along both axes. */
 double checkerboard(const std::vector<double>& phi, int n, int lamp)
 {
+  const auto at = [&phi, n](std::int64_t i, std::int64_t j)
+  { return phi[static_cast<std::size_t>(i + n * j)]; };
   double alternating = 0.;
   double all = 0.;
   for (int j = 1; j + 1 < n; ++j)
@@ -302,11 +304,10 @@ double checkerboard(const std::vector<double>& phi, int n, int lamp)
       {
         for (int a = -1; a <= 1; ++a)
         {
-          w += (a ? -0.25 : 0.5) * (b ? -0.25 : 0.5) *
-            phi[static_cast<std::size_t>(i + a + n * (j + b))];
+          w += (a ? -0.25 : 0.5) * (b ? -0.25 : 0.5) * at(i + a, j + b);
         }
       }
-      const double c = phi[static_cast<std::size_t>(i + n * j)];
+      const double c = at(i, j);
       alternating += w * w;
       all += c * c;
     }
@@ -327,14 +328,14 @@ void noCheckerboard(Suite& suite)
       scene.boundary = Boundary::Absorbing;
       scene.D.assign(scene.D.size(), 1. / (3. * sigma_t));
       scene.sigma_a.assign(scene.D.size(), sigma_a);
+      CollocatedMoments thesis(n);
       for (int b = -lamp; b <= lamp; ++b)
       {
         for (int a = -lamp; a <= lamp; ++a)
         {
-          (pulse ? scene.phi : scene.q)[static_cast<std::size_t>(n / 2 + a + n * (n / 2 + b))] = 1.;
+          (pulse ? scene.phi : scene.q)[thesis.index(n / 2 + a, n / 2 + b)] = 1.;
         }
       }
-      CollocatedMoments thesis(n);
       thesis.phi = scene.phi;
       FirstMomentSolver solver;
       solver.setMedium(scene.medium());
@@ -361,7 +362,7 @@ void noCheckerboard(Suite& suite)
         {
           for (int i = n / 2 - 8; i <= n / 2 + 8; ++i)
           {
-            const std::size_t c = static_cast<std::size_t>(i + n * j);
+            const std::size_t c = thesis.index(i, j);
             dark += thesis.phi[c] == 0. ? 1 : 0;
             darkHere += scene.phi[c] > 0. ? 0 : 1;
           }

@@ -161,7 +161,8 @@ void shape(Suite& suite)
     {
       centroid[0] += q[n] * grid.voxelVolume() * (n % 40);
       centroid[1] += q[n] * grid.voxelVolume() * (n / 40 % 30);
-      centroid[2] += q[n] * grid.voxelVolume() * (n / 1200);
+      const std::int64_t k = n / 1200;
+      centroid[2] += q[n] * grid.voxelVolume() * k;
     }
     LT_CHECK_NEAR(suite, centroid[0], 19.3, 0.02);
     LT_CHECK_NEAR(suite, centroid[1], 14.8, 0.02);

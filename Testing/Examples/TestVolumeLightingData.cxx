@@ -125,7 +125,7 @@ int main(int argc, char* argv[])
     const auto traced = [&]
     {
       lighting->SetShadowModeToRayTraced();
-      const Picture picture = scene.capture();
+      Picture picture = scene.capture();
       lighting->SetShadowModeToPrecomputed();
       return picture;
     };

@@ -56,8 +56,8 @@ struct Pipeline
     int dims[3];
     this->volume->GetDimensions(dims);
     const double* h = this->volume->GetSpacing();
-    this->seeds->AddSphere(
-      h[0] * (dims[0] / 2 + shift), h[1] * (dims[1] / 2), h[2] * (dims[2] / 2), 0., power);
+    const int middle[3] = { dims[0] / 2 + shift, dims[1] / 2, dims[2] / 2 }; // a voxel's centre
+    this->seeds->AddSphere(h[0] * middle[0], h[1] * middle[1], h[2] * middle[2], 0., power);
   }
   void expect(Suite& suite, const char* what, bool positive = true, double balance = 1e-6)
   {

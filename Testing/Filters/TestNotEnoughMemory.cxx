@@ -22,7 +22,6 @@
 #endif
 
 using lighttransport::testing::makeImage;
-using lighttransport::testing::pointArray;
 using lighttransport::testing::Suite;
 
 namespace

@@ -366,7 +366,8 @@ void missing(Suite& suite)
   vtkNew<vtkPoints> points;
   for (int i = 0; i < 12; ++i)
   {
-    points->InsertNextPoint(i < 3 ? i % 2 : 5., i < 3 ? i / 2 : 5., 0.);
+    const int row = i / 2;
+    points->InsertNextPoint(i < 3 ? i % 2 : 5., i < 3 ? row : 5., 0.);
   }
   vtkNew<vtkCellArray> cells;
   for (vtkIdType i = 0; i < 12; i += 3)

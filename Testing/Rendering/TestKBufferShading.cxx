@@ -43,7 +43,8 @@ void testOtherPasses(Suite& suite)
   auto* light = static_cast<float*>(sky->GetScalarPointer());
   for (int i = 0; i < 32 * 16; ++i)
   {
-    const float up = static_cast<float>(i / 32) / 15.F;
+    const int row = i / 32;
+    const float up = static_cast<float>(row) / 15.F;
     light[3 * i] = .3F + 2.F * up;
     light[3 * i + 1] = .4F + 1.5F * up;
     light[3 * i + 2] = .8F + up;

@@ -318,7 +318,8 @@ void environment(Suite& suite)
   for (int i = 0; i < 512; ++i)
   {
     // VTK's maps: the first row is -up, the middle column the direction `right`.
-    const double up = -std::cos(3.14159265 * (i / 32 + .5) / 16.);
+    const int row = i / 32;
+    const double up = -std::cos(3.14159265 * (row + .5) / 16.);
     const double right =
       std::cos(3.14159265 * (2. * (i % 32 + .5) / 32. - 1.)) * std::sqrt(1. - up * up);
     radiance->SetTuple3(i, std::max(up, 0.), std::max(right, 0.), std::max(-up, 0.));

@@ -70,9 +70,10 @@ inline void transfer2D(vtkVolumeProperty* property, int component = 0)
   auto* rgba = static_cast<float*>(function->GetScalarPointer());
   for (int i = 0; i < 32 * 32; ++i)
   {
+    const int row = i / 32;
     rgba[4 * i] = static_cast<float>(i % 32) / 31.F;
     rgba[4 * i + 1] = .5F;
-    rgba[4 * i + 2] = static_cast<float>(i / 32) / 31.F;
+    rgba[4 * i + 2] = static_cast<float>(row) / 31.F;
     rgba[4 * i + 3] = .1F * static_cast<float>(i % 32) / 31.F;
   }
   property->SetTransferFunction2D(component, function);

@@ -205,9 +205,8 @@ struct Scene
     const Point c = { (b[0] + b[1]) / 2., (b[2] + b[3]) / 2., (b[4] + b[5]) / 2. };
     camera->SetFocalPoint(c.data());
     camera->SetPosition(c[0] + from[0], c[1] + from[1], c[2] + from[2]);
-    camera->SetViewUp(std::abs(from[2]) > std::abs(from[0]) + std::abs(from[1]) ? 0. : 0.,
-      std::abs(from[2]) > std::abs(from[0]) + std::abs(from[1]) ? 1. : 0.,
-      std::abs(from[2]) > std::abs(from[0]) + std::abs(from[1]) ? 0. : 1.);
+    const bool alongZ = std::abs(from[2]) > std::abs(from[0]) + std::abs(from[1]);
+    camera->SetViewUp(0., alongZ ? 1. : 0., alongZ ? 0. : 1.);
     camera->SetParallelProjection(parallel);
     this->renderer->ResetCamera(b);
   }
