@@ -1124,12 +1124,11 @@ void DiffusionSolver::setShift(double value)
   this->multigridReady = false;
 }
 
-void DiffusionSolver::prepareMultigrid(const MultigridWork& work, const ParallelFor& loop)
+void DiffusionSolver::prepareMultigrid(const ParallelFor& loop)
 {
   if (!this->multigridReady)
   {
-    this->storeFaces();
-    this->multigrid.setup(this->A, work, loop);
+    this->multigrid.setup(this->A, loop);
     this->multigridReady = true;
   }
 }
@@ -1537,15 +1536,23 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   };
   const ParallelFor& loop = control.progress ? watched : this->parallelFor;
 
-  Buffer<float> Ap(size, this->A.pages);
-  Buffer<float> p(size, this->A.pages);
+  // A rough answer is had with less memory: faces are computed, and z and A p share theirs.
+  const bool frugal = control.tolerance >= FrugalTolerance;
+  if (frugal)
+  {
+    this->forgetFaces();
+  }
+  else
+  {
+    this->storeFaces();
+  }
   // A set-up that is given up half-way is none: what it has made goes.
   struct GivenUp
   {
   };
   try
   {
-    this->prepareMultigrid({ Ap.data(), p.data() },
+    this->prepareMultigrid(
       [&](std::int64_t n, const RangeBody& body)
       {
         loop(n, body);
@@ -1563,12 +1570,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     return;
   }
   const DiffusionOperator& op = this->A;
-  // A rough answer is had with less memory: faces are computed, and z and A p share theirs.
-  const bool frugal = control.tolerance >= FrugalTolerance;
-  if (frugal)
-  {
-    this->forgetFaces();
-  }
+  Buffer<float> Ap(size, this->A.pages);
+  Buffer<float> p(size, this->A.pages);
   Buffer<float> own(frugal ? 0 : size, this->A.pages);
   Buffer<float>& z = frugal ? Ap : own;
   report.bytes = std::max(report.bytes, this->bytesHeld() + op.activeSize * (frugal ? 20 : 24));

@@ -321,8 +321,7 @@ private:
     const T* q, bool& singular, std::vector<std::uint8_t>& reached, DiffusionReport& report) const;
   /** Adds a constant to all sinks (1 / (c dt) of an implicit step); 0 takes it away. */
   void setShift(double shift);
-  /** work: two vectors of zeros, which they are afterwards. */
-  void prepareMultigrid(const MultigridWork& work, const ParallelFor& loop);
+  void prepareMultigrid(const ParallelFor& loop);
   std::int64_t bytesHeld() const;
   std::int64_t rows() const;
   void boundaryOf(Boundary boundary);

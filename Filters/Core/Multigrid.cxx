@@ -17,6 +17,10 @@ using Weights = MultigridWeights;
 constexpr std::int64_t TileValues = 4096;
 constexpr int TilePlanes = 16;
 
+/** The set-up goes through so many coarse planes, or values of them, at a time. */
+constexpr int SlabPlanes = 8;
+constexpr std::int64_t SlabValues = 32768;
+
 /** A coarse diagonal is at least this part of Galerkin's, see Multigrid::raise. */
 constexpr float LeastPart = 0.3f;
 
@@ -832,24 +836,32 @@ void skew(
   }
 }
 
+/** body(row, begin, n, faces) for each row of the domain. */
+template <class Body>
+void forEachFaces(const DiffusionOperator& A, const ParallelFor& parallelFor, const Body& body)
+{
+  if (A.isStored())
+  {
+    ForEachRow(A, parallelFor,
+      [&](std::int64_t r, std::int64_t o, int n) { body(r, o, n, facesOfRow(A, r, o)); });
+  }
+  else
+  {
+    skew(A, 1, parallelFor,
+      [&](int, std::int64_t r, const RowFaces& faces)
+      { body(r, r * A.dims[0], A.dims[0], faces); });
+  }
+}
+
 /** The sum of what row(row, begin, n, faces) returns, in an order that threads do not change. */
 template <class Row>
 double sumFaces(const DiffusionOperator& A, const ParallelFor& parallelFor, const Row& row)
 {
   std::vector<double> partial(
     static_cast<std::size_t>(A.dims[1]) * static_cast<std::size_t>(A.dims[2]), 0.);
-  if (A.isStored())
-  {
-    ForEachRow(A, parallelFor,
-      [&](std::int64_t r, std::int64_t o, int n)
-      { partial[static_cast<std::size_t>(r)] = row(r, o, n, facesOfRow(A, r, o)); });
-  }
-  else
-  {
-    skew(A, 1, parallelFor,
-      [&](int, std::int64_t r, const RowFaces& faces)
-      { partial[static_cast<std::size_t>(r)] = row(r, r * A.dims[0], A.dims[0], faces); });
-  }
+  forEachFaces(A, parallelFor,
+    [&](std::int64_t r, std::int64_t o, int n, const RowFaces& faces)
+    { partial[static_cast<std::size_t>(r)] = row(r, o, n, faces); });
   double sum = 0.;
   for (const double p : partial)
   {
@@ -992,9 +1004,30 @@ std::int64_t Multigrid::bytes() const
   return sum;
 }
 
+/** Sums of the faces along each axis. */
+static std::array<double, 3> sumOfFaces(const DiffusionOperator& A, const ParallelFor& parallelFor)
+{
+  std::vector<std::array<double, 3>> partial(
+    static_cast<std::size_t>(A.dims[1]) * static_cast<std::size_t>(A.dims[2]), { { 0., 0., 0. } });
+  forEachFaces(A, parallelFor,
+    [&](std::int64_t r, std::int64_t, int n, const RowFaces& f)
+    {
+      partial[static_cast<std::size_t>(r)] = { { sumRow(n, f.gx), sumRow(n, f.gy),
+        sumRow(n, f.gz) } };
+    });
+  std::array<double, 3> sums{ { 0., 0., 0. } };
+  for (const auto& row : partial)
+  {
+    for (std::size_t d = 0; d < 3; ++d)
+    {
+      sums[d] += row[d];
+    }
+  }
+  return sums;
+}
+
 //------------------------------------------------------------------------------
-void Multigrid::setup(
-  const DiffusionOperator& A, const MultigridWork& work, const ParallelFor& parallelFor)
+void Multigrid::setup(const DiffusionOperator& A, const ParallelFor& parallelFor)
 {
   this->release();
   this->finest = &A;
@@ -1004,21 +1037,15 @@ void Multigrid::setup(
   {
     Level& level = this->levels.back();
     // 1. which axes to halve: those whose mean conductance is not far below the largest
-    double mean[3] = { 0., 0., 0. };
+    std::array<double, 3> mean = sumOfFaces(*fine, parallelFor);
     double largest = 0.;
-    for (int d = 0; d < 3; ++d)
+    for (std::size_t d = 0; d < 3; ++d)
     {
-      if (fine->dims[d] > 1)
-      {
-        const float* g = fine->g[d].data();
-        mean[d] = SumEachRow(*fine, parallelFor,
-                    [&](std::int64_t, std::int64_t o, int n) { return sumRow(n, g + o); }) *
-          fine->dims[d] / (fine->dims[d] - 1.);
-        largest = std::max(largest, mean[d]);
-      }
+      mean[d] *= fine->dims[d] > 1 ? fine->dims[d] / (fine->dims[d] - 1.) : 0.;
+      largest = std::max(largest, mean[d]);
     }
     bool any = false;
-    for (int d = 0; d < 3; ++d)
+    for (std::size_t d = 0; d < 3; ++d)
     {
       level.halved[d] = fine->dims[d] > 1 && mean[d] > 0.3 * largest;
       any = any || level.halved[d];
@@ -1029,7 +1056,7 @@ void Multigrid::setup(
     }
     this->levels.emplace_back();
     Level& coarse = this->levels.back();
-    this->coarsen(*fine, this->levels[this->levels.size() - 2], coarse, work, parallelFor);
+    this->coarsen(*fine, this->levels[this->levels.size() - 2], coarse, parallelFor);
     fine = &coarse.A;
   }
   for (std::size_t l = 1; l <= AcceleratedLevels && l + 1 < this->levels.size(); ++l)
@@ -1041,8 +1068,44 @@ void Multigrid::setup(
 }
 
 //------------------------------------------------------------------------------
-void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
-  const MultigridWork& work, const ParallelFor& parallelFor) const
+Multigrid::Slab::Slab(const DiffusionOperator& op, int planes)
+  : A(op)
+{
+  const std::int64_t plane = static_cast<std::int64_t>(op.dims[0]) * op.dims[1];
+  for (std::size_t i = 0; !op.isStored() && i < this->faces.size(); ++i)
+  {
+    this->faces[i].allocate(plane * (planes + 3), op.pages);
+  }
+  this->weights.allocate(4 * plane * planes, op.pages);
+  this->feltSinks.allocate(plane * planes, op.pages);
+}
+
+void Multigrid::Slab::moveTo(int firstPlane, int lastPlane, const ParallelFor& parallelFor)
+{
+  const std::int64_t ny = this->A.dims[1];
+  this->firstRow = ny * firstPlane;
+  if (this->A.isStored())
+  {
+    return;
+  }
+  const std::int64_t from = ny * std::max(firstPlane - 2, 0);
+  const std::int64_t rows = ny * std::min(lastPlane + 1, this->A.dims[2]) - from;
+  this->firstValue = from * this->A.dims[0];
+  ForRows(parallelFor, rows, rows * this->A.dims[0],
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        const std::int64_t o = r * this->A.dims[0];
+        float* const g[3] = { this->faces[0].data() + o, this->faces[1].data() + o,
+          this->faces[2].data() + o };
+        this->A.compute(from + r, g, this->faces[3].data() + o);
+      }
+    });
+}
+
+void Multigrid::coarsen(
+  const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const
 {
   const std::array<int, 3>& n = A.dims;
   std::array<int, 3> nc;
@@ -1075,52 +1138,89 @@ void Multigrid::coarsen(const DiffusionOperator& A, Level& fine, Level& coarse,
     coarse.A.restrictTo(std::move(spans));
   }
 
-  // 3. the weights, from the lines through the coarse faces, and what is felt of the sinks
-  const LineWeights all{ reinterpret_cast<std::uint8_t*>(work.first), work.second };
-  ForEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int length)
-    {
-      this->weighRow(A, fine, row, all);
-      const int begin = static_cast<int>(o - row * n[0]);
-      const int odd = static_cast<int>((row % n[1] + row / n[1]) & 1);
-      const int first = (begin - odd + 1) / 2;
-      const int last = (begin + length - odd + 1) / 2;
-      for (int d = 0; d < 3; ++d)
-      {
-        if (fine.halved[d])
-        {
-          packRow(first, last, odd, all.row(A, row, d), fine.w[d].data() + row * redPitch(A));
-        }
-      }
-      packRow(first, last, odd, all.row(A, row, 3), fine.kept.data() + row * redPitch(A));
-    });
-  // 2. faces go to the coarse columns that their voxels are put between
-  for (int d = 0; d < 3; ++d)
+  // A slab of coarse planes at a time, while what they are made of is in the cache.
+  const DiffusionOperator& C = coarse.A;
+  const std::int64_t plane = static_cast<std::int64_t>(nc[0]) * nc[1];
+  const int planes = static_cast<int>(
+    std::min<std::int64_t>(nc[2], std::max<std::int64_t>(SlabPlanes, SlabValues / plane)));
+  const int step = fine.halved[2] ? 2 : 1;
+  Slab slab(A, step * planes + 2);
+  const auto forRows =
+    [&](const DiffusionOperator& op, std::int64_t from, std::int64_t to, auto&& body)
   {
-    if (fine.halved[d])
-    {
-      this->gatherFaces(A, fine, all, coarse.A, d, coarse.A.g[d].data(), parallelFor);
-    }
-    else
-    {
-      this->gather(A, fine, all, coarse.A, A.g[d].data(), d, coarse.A.g[d].data(), parallelFor);
-    }
+    ForRows(parallelFor, to - from, (to - from) * op.dims[0],
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t row = from + begin; row < from + end; ++row)
+        {
+          const Span span = op.span(row);
+          if (span.begin < span.end)
+          {
+            body(row, row * op.dims[0] + span.begin, span.end - span.begin);
+          }
+        }
+      });
+  };
+  for (int K = 0; K < nc[2]; K += planes)
+  {
+    const int end = std::min(K + planes, nc[2]);
+    const int own[2] = { step * K, std::min(step * end, n[2]) };
+    const int first = std::max(own[0] - 1, 0);
+    const int last = std::min(own[1] + 1, n[2]);
+    slab.moveTo(first, last, parallelFor);
+    // 3. the weights, from the lines through the coarse faces, and what is felt of the sinks
+    forRows(A, static_cast<std::int64_t>(n[1]) * first, static_cast<std::int64_t>(n[1]) * last,
+      [&](std::int64_t row, std::int64_t o, int length)
+      {
+        this->weighRow(A, fine, row, slab);
+        if (row < static_cast<std::int64_t>(n[1]) * own[0] ||
+          row >= static_cast<std::int64_t>(n[1]) * own[1])
+        {
+          return; // another slab's
+        }
+        const int begin = static_cast<int>(o - row * n[0]);
+        const int odd = static_cast<int>((row % n[1] + row / n[1]) & 1);
+        const int from = (begin - odd + 1) / 2;
+        const int to = (begin + length - odd + 1) / 2;
+        for (int d = 0; d < 3; ++d)
+        {
+          if (fine.halved[d])
+          {
+            packRow(from, to, odd, slab.row(row, d), fine.w[d].data() + row * redPitch(A));
+          }
+        }
+        packRow(from, to, odd, slab.row(row, 3), fine.kept.data() + row * redPitch(A));
+      });
+    // 2. faces go to the coarse columns that their voxels are put between
+    const std::int64_t rows[2] = { static_cast<std::int64_t>(nc[1]) * K,
+      static_cast<std::int64_t>(nc[1]) * end };
+    forRows(C, rows[0], rows[1],
+      [&](std::int64_t row, std::int64_t o, int length)
+      {
+        for (int d = 0; d < 3; ++d)
+        {
+          float* to = coarse.A.g[d].data() + o;
+          if (fine.halved[d])
+          {
+            this->gatherFaces(A, fine, slab, C, d, row, o, length, to);
+          }
+          else
+          {
+            this->gather(A, fine, slab, C, d, row, o, length, to);
+          }
+        }
+        this->gather(A, fine, slab, C, -1, row, o, length, coarse.A.s.data() + o);
+      });
+    forRows(C, rows[0], rows[1],
+      [&](std::int64_t row, std::int64_t o, int length)
+      { this->raise(A, fine, slab, coarse.A, row, o, length); });
   }
-  this->gather(A, fine, all, coarse.A, all.felt, -1, coarse.A.s.data(), parallelFor);
-  this->raise(A, fine, all, coarse.A, parallelFor);
   // Where light has nowhere to go (a singular part), the coarsest voxel has neither.
   CloseIsolated(coarse.A, 1.f, parallelFor);
-  // kernels read values beside a row, times a face of 0: that must be finite
-  ForEachRow(A, parallelFor,
-    [&](std::int64_t row, std::int64_t, int)
-    {
-      std::fill(work.first + row * n[0], work.first + (row + 1) * n[0], 0.f);
-      std::fill(work.second + row * n[0], work.second + (row + 1) * n[0], 0.f);
-    });
 }
 
 void Multigrid::weighRow(
-  const DiffusionOperator& A, const Level& fine, std::int64_t row, const LineWeights& all) const
+  const DiffusionOperator& A, const Level& fine, std::int64_t row, Slab& slab) const
 {
   const std::array<int, 3>& n = A.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
@@ -1135,8 +1235,8 @@ void Multigrid::weighRow(
     {
       continue;
     }
-    std::uint8_t* w = all.row(A, row, d);
-    const float* g = A.g[d].data() + o;
+    std::uint8_t* w = slab.row(row, d);
+    const float* g = slab.g(d, o);
     const std::int64_t t = stride[d];
     if (d > 0 && at[d] % 2 == 1 && at[d] + 1 < n[d])
     {
@@ -1153,8 +1253,7 @@ void Multigrid::weighRow(
     if (d == 0)
     {
       // faces after the odd voxels; the last voxel of an odd row is its own centre
-      lineAlong(
-        begin | 1, std::min(begin + length, n[0] - 1), n[0] - 2, A.g[0].data() + row * n[0], w);
+      lineAlong(begin | 1, std::min(begin + length, n[0] - 1), n[0] - 2, slab.g(0, row * n[0]), w);
     }
   }
   // A sink pulls its own voxel down, and the parents only as far as the voxel is tied to them:
@@ -1168,7 +1267,7 @@ void Multigrid::weighRow(
     {
       continue;
     }
-    const float* g = A.g[d].data() + o;
+    const float* g = slab.g(d, o);
     if (d > 0)
     {
       const bool odd = at[d] % 2 == 1;
@@ -1182,7 +1281,7 @@ void Multigrid::weighRow(
       continue;
     }
     const int lone = n[0] % 2 == 1 ? n[0] - 1 : n[0]; // its own centre
-    const float* whole = A.g[0].data() + row * n[0];
+    const float* whole = slab.g(0, row * n[0]);
     float* ties = store.data();
     // odd voxels, then even ones; faces outside the row are 0
     tieRow(begin | 1, std::min(begin + length, n[0] - 2), 2, whole - 1, whole, whole + 1, ties);
@@ -1202,7 +1301,7 @@ void Multigrid::weighRow(
       tieRow(lone, lone + 1, 2, nullptr, whole - 1, whole - 2, ties);
     }
   }
-  keepRow(length, tie, A.s.data() + o, all.row(A, row, 3) + begin, all.felt + o);
+  keepRow(length, tie, slab.s(o), slab.row(row, 3) + begin, slab.felt(o));
 }
 
 Multigrid::Footprint Multigrid::footprint(
@@ -1219,7 +1318,7 @@ Multigrid::Footprint Multigrid::footprint(
   return rows;
 }
 
-void Multigrid::weigh(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
+void Multigrid::weigh(const DiffusionOperator& A, const Level& fine, const Slab& slab,
   const int at[3], const int J[3], int along, bool ends, Weights weights[3]) const
 {
   const std::int64_t row = at[1] + static_cast<std::int64_t>(A.dims[1]) * at[2];
@@ -1231,8 +1330,8 @@ void Multigrid::weigh(const DiffusionOperator& A, const Level& fine, const LineW
     if (fine.halved[d] && d != along)
     {
       const bool parent = d == 0 || at[d] / 2 == J[d];
-      weights[d] = { all.row(A, row, d) + at[0], all.row(A, other, d) + at[0] + step,
-        parent ? 255 : 0, parent ? -1 : 1 };
+      weights[d] = { slab.row(row, d) + at[0], slab.row(other, d) + at[0] + step, parent ? 255 : 0,
+        parent ? -1 : 1 };
     }
     else
     {
@@ -1241,204 +1340,192 @@ void Multigrid::weigh(const DiffusionOperator& A, const Level& fine, const LineW
   }
 }
 
-void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
-  const DiffusionOperator& C, const float* v, int along, float* out,
-  const ParallelFor& parallelFor) const
+void Multigrid::gather(const DiffusionOperator& A, const Level& fine, const Slab& slab,
+  const DiffusionOperator& C, int along, std::int64_t row, std::int64_t o, int length,
+  float* out) const
 {
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = C.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
-  ForEachRow(C, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int length)
+  // own: what goes to the parent; next: to its neighbour along x. Two zeros on either side.
+  static thread_local std::vector<float> store;
+  store.assign(2 * static_cast<std::size_t>(n[0] + 4), 0.f);
+  float* own = store.data() + 2;
+  float* next = own + n[0] + 4;
+  const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+  const Footprint rows = this->footprint(fine, n, J, along);
+  for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+  {
+    for (int j = rows.first[1]; j <= rows.last[1]; ++j)
     {
-      // own: what goes to the parent; next: to its neighbour along x. Two zeros on either side.
-      static thread_local std::vector<float> store;
-      store.assign(2 * static_cast<std::size_t>(n[0] + 4), 0.f);
-      float* own = store.data() + 2;
-      float* next = own + n[0] + 4;
-      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-      const Footprint rows = this->footprint(fine, n, J, along);
-      for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+      const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+      if (span.begin >= span.end)
       {
-        for (int j = rows.first[1]; j <= rows.last[1]; ++j)
-        {
-          const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
-          if (span.begin >= span.end)
-          {
-            continue;
-          }
-          const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
-          const int at[3] = { span.begin, j, k };
-          // a face's weights are the mean of those at its two ends
-          const bool ends = along == 0 || (along > 0 && at[along] + 1 < n[along]);
-          Weights weights[3];
-          this->weigh(A, fine, all, at, J, along, ends, weights);
-          gatherRow(span.end - span.begin, v + f, weights[0], weights[1], weights[2],
-            own + span.begin, next + span.begin);
-        }
+        continue;
       }
-      const int begin = static_cast<int>(o - row * nc[0]);
-      columnRow(begin, begin + length, fine.halved[0], own, next, out + row * nc[0]);
-    });
+      const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
+      const int at[3] = { span.begin, j, k };
+      // a face's weights are the mean of those at its two ends
+      const bool ends = along == 0 || (along > 0 && at[along] + 1 < n[along]);
+      Weights weights[3];
+      this->weigh(A, fine, slab, at, J, along, ends, weights);
+      gatherRow(span.end - span.begin, along < 0 ? slab.felt(f) : slab.g(along, f), weights[0],
+        weights[1], weights[2], own + span.begin, next + span.begin);
+    }
+  }
+  const int begin = static_cast<int>(o - row * nc[0]);
+  columnRow(begin, begin + length, fine.halved[0], own, next, out - begin);
 }
 
-void Multigrid::raise(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
-  DiffusionOperator& C, const ParallelFor& parallelFor) const
+void Multigrid::raise(const DiffusionOperator& A, const Level& fine, const Slab& slab,
+  DiffusionOperator& C, std::int64_t row, std::int64_t o, int length) const
 {
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = C.dims;
   const std::int64_t plane = static_cast<std::int64_t>(n[0]) * n[1];
-  ForEachRow(C, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int length)
+  // weights a and b of up to 4 x 4 fine rows; beyond them zeros
+  static thread_local std::vector<float> store;
+  const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
+  store.resize(std::max(store.size(), 36 * room));
+  float* zeros = store.data() + 2;
+  float* own = zeros + room;
+  float* next = own + room;
+  std::fill(store.data(), store.data() + 3 * room, 0.f);
+  const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+  const Footprint rows = this->footprint(fine, n, J, -1);
+  // jj and kk count from 1
+  const auto weights = [&](int jj, int kk, int which)
+  {
+    const bool inside = jj >= 1 && jj <= rows.last[1] - rows.first[1] + 1 && kk >= 1 &&
+      kk <= rows.last[2] - rows.first[2] + 1;
+    return inside ? own + static_cast<std::size_t>(2 * (4 * (kk - 1) + jj - 1) + which + 2) * room
+                  : zeros;
+  };
+  for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+  {
+    for (int j = rows.first[1]; j <= rows.last[1]; ++j)
     {
-      // weights a and b of up to 4 x 4 fine rows; beyond them zeros
-      static thread_local std::vector<float> store;
-      const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
-      store.resize(std::max(store.size(), 36 * room));
-      float* zeros = store.data() + 2;
-      float* own = zeros + room;
-      float* next = own + room;
-      std::fill(store.data(), store.data() + 3 * room, 0.f);
-      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-      const Footprint rows = this->footprint(fine, n, J, -1);
-      // jj and kk count from 1
-      const auto weights = [&](int jj, int kk, int which)
+      const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+      for (int which = 0; which < 2; ++which)
       {
-        const bool inside = jj >= 1 && jj <= rows.last[1] - rows.first[1] + 1 && kk >= 1 &&
-          kk <= rows.last[2] - rows.first[2] + 1;
-        return inside
-          ? own + static_cast<std::size_t>(2 * (4 * (kk - 1) + jj - 1) + which + 2) * room
-          : zeros;
-      };
-      for (int k = rows.first[2]; k <= rows.last[2]; ++k)
-      {
-        for (int j = rows.first[1]; j <= rows.last[1]; ++j)
-        {
-          const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
-          for (int which = 0; which < 2; ++which)
-          {
-            float* to = weights(j - rows.first[1] + 1, k - rows.first[2] + 1, which);
-            std::fill(to - 2, to + (span.begin < span.end ? span.begin : n[0] + 2), 0.f);
-            std::fill(to + (span.begin < span.end ? span.end : 0), to + n[0] + 2, 0.f);
-          }
-          if (span.begin < span.end)
-          {
-            const int at[3] = { span.begin, j, k };
-            Weights w[3];
-            this->weigh(A, fine, all, at, J, -1, false, w);
-            const int jj = j - rows.first[1] + 1;
-            const int kk = k - rows.first[2] + 1;
-            const std::int64_t fineRow = j + static_cast<std::int64_t>(n[1]) * k;
-            weightRow(span.end - span.begin, all.row(A, fineRow, 3) + span.begin, w[0], w[1], w[2],
-              weights(jj, kk, 0) + span.begin, weights(jj, kk, 1) + span.begin);
-          }
-        }
+        float* to = weights(j - rows.first[1] + 1, k - rows.first[2] + 1, which);
+        std::fill(to - 2, to + (span.begin < span.end ? span.begin : n[0] + 2), 0.f);
+        std::fill(to + (span.begin < span.end ? span.end : 0), to + n[0] + 2, 0.f);
       }
-      for (int k = rows.first[2] - 1; k <= rows.last[2]; ++k)
+      if (span.begin < span.end)
       {
-        for (int j = rows.first[1] - 1; j <= rows.last[1]; ++j)
-        {
-          if (j < 0 || k < 0)
-          {
-            continue; // no voxels, no faces
-          }
-          const int jj = j - rows.first[1] + 1;
-          const int kk = k - rows.first[2] + 1;
-          const std::int64_t f = static_cast<std::int64_t>(n[0]) * j + plane * k;
-          const float* a = weights(jj, kk, 0);
-          const float* b = weights(jj, kk, 1);
-          if (jj > 0 && kk > 0)
-          {
-            energyAlong(n[0], fine.halved[0], A.g[0].data() + f, a, b, own, next);
-            energyAcross(n[0], A.s.data() + f, a, b, zeros, zeros, own, next);
-          }
-          if (kk > 0)
-          {
-            energyAcross(n[0], A.g[1].data() + f, a, b, weights(jj + 1, kk, 0),
-              weights(jj + 1, kk, 1), own, next);
-          }
-          if (jj > 0)
-          {
-            energyAcross(n[0], A.g[2].data() + f, a, b, weights(jj, kk + 1, 0),
-              weights(jj, kk + 1, 1), own, next);
-          }
-        }
+        const int at[3] = { span.begin, j, k };
+        Weights w[3];
+        this->weigh(A, fine, slab, at, J, -1, false, w);
+        const int jj = j - rows.first[1] + 1;
+        const int kk = k - rows.first[2] + 1;
+        const std::int64_t fineRow = j + static_cast<std::int64_t>(n[1]) * k;
+        weightRow(span.end - span.begin, slab.row(fineRow, 3) + span.begin, w[0], w[1], w[2],
+          weights(jj, kk, 0) + span.begin, weights(jj, kk, 1) + span.begin);
       }
-      const int begin = static_cast<int>(o - row * nc[0]);
-      float* energy = zeros;
-      columnRow(begin, begin + length, fine.halved[0], own, next, energy);
-      raiseRow(length, LeastPart, energy + begin, facesOfRow(C, row, o), C.s.data() + o);
-    });
+    }
+  }
+  for (int k = rows.first[2] - 1; k <= rows.last[2]; ++k)
+  {
+    for (int j = rows.first[1] - 1; j <= rows.last[1]; ++j)
+    {
+      if (j < 0 || k < 0)
+      {
+        continue; // no voxels, no faces
+      }
+      const int jj = j - rows.first[1] + 1;
+      const int kk = k - rows.first[2] + 1;
+      const std::int64_t f = static_cast<std::int64_t>(n[0]) * j + plane * k;
+      const float* a = weights(jj, kk, 0);
+      const float* b = weights(jj, kk, 1);
+      if (jj > 0 && kk > 0)
+      {
+        energyAlong(n[0], fine.halved[0], slab.g(0, f), a, b, own, next);
+        energyAcross(n[0], slab.s(f), a, b, zeros, zeros, own, next);
+      }
+      if (kk > 0)
+      {
+        energyAcross(
+          n[0], slab.g(1, f), a, b, weights(jj + 1, kk, 0), weights(jj + 1, kk, 1), own, next);
+      }
+      if (jj > 0)
+      {
+        energyAcross(
+          n[0], slab.g(2, f), a, b, weights(jj, kk + 1, 0), weights(jj, kk + 1, 1), own, next);
+      }
+    }
+  }
+  const int begin = static_cast<int>(o - row * nc[0]);
+  float* energy = zeros;
+  columnRow(begin, begin + length, fine.halved[0], own, next, energy);
+  raiseRow(length, LeastPart, energy + begin, facesOfRow(C, row, o), C.s.data() + o);
 }
 
-void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
-  const DiffusionOperator& C, int along, float* out, const ParallelFor& parallelFor) const
+void Multigrid::gatherFaces(const DiffusionOperator& A, const Level& fine, const Slab& slab,
+  const DiffusionOperator& C, int along, std::int64_t row, std::int64_t o, int length,
+  float* out) const
 {
   const std::array<int, 3>& n = A.dims;
   const std::array<int, 3>& nc = C.dims;
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   constexpr float noResistance = 1e20f; // of the inner face of a voxel that is its own centre
-  ForEachRow(C, parallelFor,
-    [&](std::int64_t row, std::int64_t o, int length)
+  static thread_local std::vector<float> store;
+  const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
+  store.assign(9 * room, 0.f);
+  float* own = store.data() + 2;
+  float* next = own + 3 * room;
+  float* masked = next + 3 * room;
+  const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
+  const Footprint rows = this->footprint(fine, n, J, along);
+  for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+  {
+    for (int j = rows.first[1]; j <= rows.last[1]; ++j)
     {
-      static thread_local std::vector<float> store;
-      const std::size_t room = static_cast<std::size_t>(n[0]) + 4;
-      store.assign(9 * room, 0.f);
-      float* own = store.data() + 2;
-      float* next = own + 3 * room;
-      float* masked = next + 3 * room;
-      const int J[3] = { 0, static_cast<int>(row % nc[1]), static_cast<int>(row / nc[1]) };
-      const Footprint rows = this->footprint(fine, n, J, along);
-      for (int k = rows.first[2]; k <= rows.last[2]; ++k)
+      const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
+      const int at[3] = { span.begin, j, k };
+      if (span.begin >= span.end || (along > 0 && at[along] + 1 >= n[along]))
       {
-        for (int j = rows.first[1]; j <= rows.last[1]; ++j)
+        continue;
+      }
+      const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
+      Weights weights[3];
+      this->weigh(A, fine, slab, at, J, along, true, weights);
+      const float* g = slab.g(along, f);
+      const float* between = g;
+      const float* below = g - stride[along];
+      const float* above = g + stride[along];
+      const int count = span.end - span.begin;
+      if (along == 0)
+      {
+        maskFacesRow(count, span.begin, n[0], g, masked, masked + room, masked + 2 * room);
+        const int last = n[0] - 2 - span.begin; // its voxel above is its own centre
+        if (last >= 0 && last < count && n[0] % 2 == 1)
         {
-          const Span span = A.span(j + static_cast<std::int64_t>(n[1]) * k);
-          const int at[3] = { span.begin, j, k };
-          if (span.begin >= span.end || (along > 0 && at[along] + 1 >= n[along]))
-          {
-            continue;
-          }
-          const std::int64_t f = span.begin + stride[1] * j + stride[2] * k;
-          Weights weights[3];
-          this->weigh(A, fine, all, at, J, along, true, weights);
-          const float* g = A.g[along].data() + f;
-          const float* between = g;
-          const float* below = g - stride[along];
-          const float* above = g + stride[along];
-          const int count = span.end - span.begin;
-          if (along == 0)
-          {
-            maskFacesRow(count, span.begin, n[0], g, masked, masked + room, masked + 2 * room);
-            const int last = n[0] - 2 - span.begin; // its voxel above is its own centre
-            if (last >= 0 && last < count && n[0] % 2 == 1)
-            {
-              masked[2 * room + static_cast<std::size_t>(last)] = noResistance;
-            }
-            between = masked;
-            below = masked + room;
-            above = masked + 2 * room;
-          }
-          else if (at[along] + 2 >= n[along])
-          {
-            std::fill(masked, masked + count, noResistance);
-            above = masked;
-          }
-          gatherFacesRow(count, between, below, above, weights[0], weights[1], weights[2],
-            own + span.begin, next + span.begin, room);
+          masked[2 * room + static_cast<std::size_t>(last)] = noResistance;
         }
+        between = masked;
+        below = masked + room;
+        above = masked + 2 * room;
       }
-      // the lines of a coarse face mix between the faces: sums in series (an upper bound, which
-      // keeps bent corridors open; straight lines in parallel would be a lower one)
-      const int begin = static_cast<int>(o - row * nc[0]);
-      for (std::size_t part = 0; part < 3; ++part)
+      else if (at[along] + 2 >= n[along])
       {
-        columnRow(begin, begin + length, fine.halved[0], own + part * room, next + part * room,
-          masked + part * room);
+        std::fill(masked, masked + count, noResistance);
+        above = masked;
       }
-      const float* sums = masked + begin;
-      seriesRow(length, sums, sums + room, sums + 2 * room, out + o);
-    });
+      gatherFacesRow(count, between, below, above, weights[0], weights[1], weights[2],
+        own + span.begin, next + span.begin, room);
+    }
+  }
+  // the lines of a coarse face mix between the faces: sums in series (an upper bound, which
+  // keeps bent corridors open; straight lines in parallel would be a lower one)
+  const int begin = static_cast<int>(o - row * nc[0]);
+  for (std::size_t part = 0; part < 3; ++part)
+  {
+    columnRow(begin, begin + length, fine.halved[0], own + part * room, next + part * room,
+      masked + part * room);
+  }
+  const float* sums = masked + begin;
+  seriesRow(length, sums, sums + room, sums + 2 * room, out);
 }
 
 MultigridLine Multigrid::lineOf(

@@ -164,19 +164,11 @@ struct MultigridLine
   int odd;
 };
 
-/** Two vectors of zeros on the finest grid, which Multigrid::setup uses and leaves as zeros. */
-struct MultigridWork
-{
-  float *first, *second;
-};
-
 class Multigrid
 {
 public:
-  /**
-   * Builds the hierarchy for A, which must outlive it and be stored for as long as this takes.
-   */
-  void setup(const DiffusionOperator& A, const MultigridWork& work, const ParallelFor& parallelFor);
+  /** Builds the hierarchy for A, stored or not, which must outlive it. */
+  void setup(const DiffusionOperator& A, const ParallelFor& parallelFor);
   void release();
 
   /**
@@ -207,17 +199,51 @@ private:
     Buffer<std::uint8_t> noWeight; // a row of 0, along axes that are not halved
   };
   /**
-   * The same of all voxels, and what is felt of their sinks, while a level is set up. A row's
-   * weights, of the three axes and kept, follow each other.
+   * What a level's set-up works with, on some planes of the grid: the weights of all voxels and
+   * what is felt of their sinks, and A's coefficients where they are not stored.
    */
-  struct LineWeights
+  class Slab
   {
-    std::uint8_t* rows;
-    float* felt;
-    std::uint8_t* row(const DiffusionOperator& A, std::int64_t r, int which) const
+  public:
+    Slab(const DiffusionOperator& A, int planes);
+    /** To the planes [first, last); the coefficients reach two below and one above. */
+    void moveTo(int first, int last, const ParallelFor& parallelFor);
+    /** From voxel o of the grid on. */
+    const float* g(int d, std::int64_t o) const { return this->at(d, o); }
+    const float* s(std::int64_t o) const { return this->at(3, o); }
+    float* felt(std::int64_t o)
     {
-      return this->rows + (4 * r + which) * A.dims[0];
+      return this->feltSinks.data() + (o - this->firstRow * this->A.dims[0]);
     }
+    const float* felt(std::int64_t o) const
+    {
+      return this->feltSinks.data() + (o - this->firstRow * this->A.dims[0]);
+    }
+    /** A row's weights of the three axes and, as the fourth, what is kept. */
+    std::uint8_t* row(std::int64_t r, int which)
+    {
+      return this->weights.data() + (4 * (r - this->firstRow) + which) * this->A.dims[0];
+    }
+    const std::uint8_t* row(std::int64_t r, int which) const
+    {
+      return this->weights.data() + (4 * (r - this->firstRow) + which) * this->A.dims[0];
+    }
+
+  private:
+    const float* at(int which, std::int64_t o) const
+    {
+      if (this->A.isStored())
+      {
+        return (which < 3 ? this->A.g[static_cast<std::size_t>(which)] : this->A.s).data() + o;
+      }
+      return this->faces[static_cast<std::size_t>(which)].data() + (o - this->firstValue);
+    }
+    const DiffusionOperator& A;
+    std::array<Buffer<float>, 4> faces;
+    Buffer<std::uint8_t> weights;
+    Buffer<float> feltSinks;
+    std::int64_t firstRow = 0;
+    std::int64_t firstValue = 0; ///< of the faces
   };
   void cycle(
     std::size_t l, const float* b, float* x, const ParallelFor& parallelFor, const RowBody& done);
@@ -227,11 +253,10 @@ private:
   {
     return l == 0 ? *this->finest : this->levels[l].A;
   }
-  void coarsen(const DiffusionOperator& A, Level& fine, Level& coarse, const MultigridWork& work,
-    const ParallelFor& parallelFor) const;
+  void coarsen(
+    const DiffusionOperator& A, Level& fine, Level& coarse, const ParallelFor& parallelFor) const;
   /** A row's weights, of all its voxels. */
-  void weighRow(
-    const DiffusionOperator& A, const Level& fine, std::int64_t row, const LineWeights& all) const;
+  void weighRow(const DiffusionOperator& A, const Level& fine, std::int64_t row, Slab& slab) const;
 
   using Weights = MultigridWeights;
   /** The fine rows, along y and z, that have to do with a coarse one. */
@@ -242,21 +267,23 @@ private:
   Footprint footprint(
     const Level& fine, const std::array<int, 3>& n, const int J[3], int along) const;
   /** Of the values from `at` on; where `ends`, with those at the other end of a face `along`. */
-  void weigh(const DiffusionOperator& A, const Level& fine, const LineWeights& all, const int at[3],
+  void weigh(const DiffusionOperator& A, const Level& fine, const Slab& slab, const int at[3],
     const int J[3], int along, bool ends, Weights weights[3]) const;
   /**
-   * out_C = sum over voxels f of P_fC v_f, without P's part for the sinks. `along` >= 0: v
-   * stands on the faces along that axis, which is not halved.
+   * out_C = sum over voxels f of P_fC v_f, without P's part for the sinks, on `length` values from
+   * o on of a row of C. v is what is felt of the sinks, or the faces `along` >= 0, an axis that is
+   * not halved.
    */
-  void gather(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
-    const DiffusionOperator& C, const float* v, int along, float* out,
-    const ParallelFor& parallelFor) const;
+  void gather(const DiffusionOperator& A, const Level& fine, const Slab& slab,
+    const DiffusionOperator& C, int along, std::int64_t row, std::int64_t o, int length,
+    float* out) const;
   /** Raises coarse sinks where the diagonal is far below that of P^T A P, see 3. above. */
-  void raise(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
-    DiffusionOperator& C, const ParallelFor& parallelFor) const;
+  void raise(const DiffusionOperator& A, const Level& fine, const Slab& slab, DiffusionOperator& C,
+    std::int64_t row, std::int64_t o, int length) const;
   /** The coarse faces along an axis that is halved, see 2. above. */
-  void gatherFaces(const DiffusionOperator& A, const Level& fine, const LineWeights& all,
-    const DiffusionOperator& C, int along, float* out, const ParallelFor& parallelFor) const;
+  void gatherFaces(const DiffusionOperator& A, const Level& fine, const Slab& slab,
+    const DiffusionOperator& C, int along, std::int64_t row, std::int64_t o, int length,
+    float* out) const;
   MultigridLine lineOf(
     const DiffusionOperator& A, const Level& fine, const int at[3], std::int64_t row) const;
   /**
