@@ -1582,6 +1582,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   int stalls = 0;
   double rz = 0.;
   double rp = 0.;
+  double least = std::numeric_limits<double>::infinity(); // r . z of phi, so far
+  bool careful = false;
   double alpha = 0.;
   double pScale = rScale; // p's unit
   bool restart = false;
@@ -1715,22 +1717,25 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
         [&](std::int64_t, std::int64_t o, int n)
         { combine(n, static_cast<float>(beta), z.data() + o, p.data() + o); });
       pAp = Apply(op, p.data(), Ap.data(), loop);
-      if (fresh && beta != 0.)
-      {
-        // The recomputed r has parts along p that the last step should have taken: with r . z the
-        // step would be too long by far, and every one after it again.
-        rp = SumEachRow(op, loop,
-          [&](std::int64_t, std::int64_t o, int n)
-          {
-            double sums[2];
-            twoDots(n, p.data() + o, r.data() + o, r.data() + o, sums);
-            return sums[0];
-          });
-      }
     }
     else
     {
       pAp = Advance(op, z.data(), static_cast<float>(beta), p.data(), Ap.data(), loop);
+    }
+    // What grows has lost its directions to float's rounding.
+    least = std::min(least, rzOfPhi);
+    careful = careful || rzOfPhi > 4. * least;
+    if ((fresh || careful) && beta != 0.)
+    {
+      // A recomputed r has parts along p that the last step should have taken, as has one that
+      // was rounded: with r . z the step would be too long by far, and every one after it again.
+      rp = SumEachRow(op, loop,
+        [&](std::int64_t, std::int64_t o, int n)
+        {
+          double sums[2];
+          twoDots(n, p.data() + o, r.data() + o, r.data() + o, sums);
+          return sums[0];
+        });
     }
     fresh = false;
     report.fineApplications += 1.;
@@ -2025,8 +2030,8 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
 
 //------------------------------------------------------------------------------
 template <class T>
-bool DiffusionSolver::steadyStateExists(
-  const T* q, bool& singular, std::vector<std::uint8_t>& seen, DiffusionReport& report) const
+bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, std::vector<std::uint8_t>& seen,
+  std::vector<ClosedPart>& closed, DiffusionReport& report) const
 {
   singular = false;
   if (this->everySink || (this->anySink && !this->anyWall))
@@ -2065,33 +2070,24 @@ bool DiffusionSolver::steadyStateExists(
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   seen.assign(static_cast<std::size_t>(size), 0);
   std::vector<std::int64_t> front;
-  for (std::int64_t seed = 0; seed < size; ++seed)
+  const auto flood = [&](std::int64_t seed, std::uint8_t mark, const auto& action)
   {
-    if (seen[static_cast<std::size_t>(seed)] || q[seed] == T(0))
-    {
-      continue; // only the parts with a source matter
-    }
-    double sum = 0.;
-    double magnitude = 0.;
-    bool sink = false;
-    seen[static_cast<std::size_t>(seed)] = 1;
+    seen[static_cast<std::size_t>(seed)] = mark;
     front.assign(1, seed);
     while (!front.empty())
     {
       const std::int64_t i = front.back();
       front.pop_back();
-      sum += static_cast<double>(q[i]);
-      magnitude += std::abs(static_cast<double>(q[i]));
-      sink = sink || this->A.s[i] > NoSink;
+      action(i);
       const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>((i / n[0]) % n[1]),
         static_cast<int>(i / stride[2]) };
       for (int d = 0; d < 3; ++d)
       {
         const auto visit = [&](std::int64_t j)
         {
-          if (!seen[static_cast<std::size_t>(j)])
+          if (seen[static_cast<std::size_t>(j)] != mark)
           {
-            seen[static_cast<std::size_t>(j)] = 1;
+            seen[static_cast<std::size_t>(j)] = mark;
             front.push_back(j);
           }
         };
@@ -2105,6 +2101,23 @@ bool DiffusionSolver::steadyStateExists(
         }
       }
     }
+  };
+  for (std::int64_t seed = 0; seed < size; ++seed)
+  {
+    if (seen[static_cast<std::size_t>(seed)] || q[seed] == T(0))
+    {
+      continue; // only the parts with a source matter
+    }
+    double sum = 0.;
+    double magnitude = 0.;
+    bool sink = false;
+    flood(seed, 1,
+      [&](std::int64_t i)
+      {
+        sum += static_cast<double>(q[i]);
+        magnitude += std::abs(static_cast<double>(q[i]));
+        sink = sink || this->A.s[i] > NoSink;
+      });
     if (!sink && std::abs(sum) > balanced * magnitude)
     {
       const double V = this->box.voxelVolume();
@@ -2113,8 +2126,56 @@ bool DiffusionSolver::steadyStateExists(
             << ", " << seed / stride[2] << ")";
       return refuse(sum * V, magnitude * V, where.str());
     }
+    if (!sink)
+    {
+      closed.emplace_back();
+      flood(seed, 2, [&](std::int64_t i) { closed.back().push_back(i); });
+    }
   }
   return true;
+}
+
+std::vector<std::pair<std::int64_t, float>> DiffusionSolver::ground(
+  bool singular, const std::vector<ClosedPart>& closed)
+{
+  std::vector<std::pair<std::int64_t, float>> before;
+  if (!singular && closed.empty())
+  {
+    return before;
+  }
+  this->storeFaces();
+  const std::array<int, 3>& n = this->box.dims;
+  const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
+  const auto faces = [&](std::int64_t i)
+  {
+    float sum = 0.f;
+    for (int d = 0; d < 3; ++d)
+    {
+      sum += this->A.g[d][i] + (i / stride[d] % n[d] > 0 ? this->A.g[d][i - stride[d]] : 0.f);
+    }
+    return sum;
+  };
+  const auto sinkAt = [&](std::int64_t i)
+  {
+    before.emplace_back(i, this->A.s[i]);
+    this->A.s[i] = faces(i);
+  };
+  if (singular)
+  {
+    std::int64_t best = 0;
+    for (std::int64_t i = 1; i < this->box.size(); ++i)
+    {
+      best = faces(i) > faces(best) ? i : best;
+    }
+    sinkAt(best);
+  }
+  for (const ClosedPart& part : closed)
+  {
+    sinkAt(*std::max_element(part.begin(), part.end(),
+      [&](std::int64_t a, std::int64_t b) { return faces(a) < faces(b); }));
+  }
+  this->multigridReady = false;
+  return before;
 }
 
 //------------------------------------------------------------------------------
@@ -2167,7 +2228,9 @@ DiffusionReport DiffusionSolver::solveSteady(
   this->setShift(0.);
   bool singular = false;
   std::vector<std::uint8_t> reached;
-  if (this->startsInside(q, report) && this->steadyStateExists(q, singular, reached, report))
+  std::vector<ClosedPart> closed;
+  if (this->startsInside(q, report) &&
+    this->steadyStateExists(q, singular, reached, closed, report))
   {
     const std::int64_t size = this->box.size();
     const auto darken = [&]
@@ -2205,9 +2268,30 @@ DiffusionReport DiffusionSolver::solveSteady(
     }
     else
     {
+      const auto grounded = this->ground(singular, closed);
       this->conjugateGradients(b, phi, control, 0., 1., report);
+      for (const auto& voxel : grounded)
+      {
+        if (this->A.isStored())
+        {
+          this->A.s[voxel.first] = voxel.second;
+        }
+        this->multigridReady = false;
+      }
     }
     this->keepSign(b, phi, control, report);
+    for (const ClosedPart& part : closed)
+    {
+      double sum = 0.;
+      for (const std::int64_t i : part)
+      {
+        sum += phi[i];
+      }
+      for (const std::int64_t i : part)
+      {
+        phi[i] -= sum / static_cast<double>(part.size());
+      }
+    }
     darken(); // a closed part without sink may hold any constant: it holds none
     if (singular)
     {
@@ -2762,7 +2846,8 @@ DiffusionReport DiffusionSolver::stepLocal(
   }
   bool singular = false;
   std::vector<std::uint8_t> reached;
-  if (q && !this->steadyStateExists(q, singular, reached, report))
+  std::vector<ClosedPart> closed;
+  if (q && !this->steadyStateExists(q, singular, reached, closed, report))
   {
     return report;
   }

@@ -311,14 +311,23 @@ private:
   template <class T>
   DiffusionReport march(
     const T* q, double* phi, int steps, double step, bool local, const DiffusionControl& control);
+  /** What walls close off without a sink, though sources in it cancel: its voxels. */
+  using ClosedPart = std::vector<std::int64_t>;
   /**
    * False, with a message, where light has nowhere to go. singular: no voxel has a sink, and
    * phi is fixed up to a constant. reached: where walls may close parts off, a flag per voxel
-   * for those that light reaches; else empty.
+   * for those that light reaches; else empty. closed: parts in which phi is fixed up to a constant.
    */
   template <class T>
-  bool steadyStateExists(
-    const T* q, bool& singular, std::vector<std::uint8_t>& reached, DiffusionReport& report) const;
+  bool steadyStateExists(const T* q, bool& singular, std::vector<std::uint8_t>& reached,
+    std::vector<ClosedPart>& closed, DiffusionReport& report) const;
+  /**
+   * A sink as large as its faces for the best connected voxel of each closed part, of the volume
+   * where it is all singular: the preconditioner would divide by rounding. Light that cancels does
+   * not use it. Answers what stood there.
+   */
+  std::vector<std::pair<std::int64_t, float>> ground(
+    bool singular, const std::vector<ClosedPart>& closed);
   /** Adds a constant to all sinks (1 / (c dt) of an implicit step); 0 takes it away. */
   void setShift(double shift);
   void prepareMultigrid(const ParallelFor& loop);

@@ -589,6 +589,75 @@ void easySteps(Suite& suite)
   LT_CHECK(suite, most > 0 && most <= 60);
 }
 
+/**
+ * Sources that cancel where nothing absorbs: mirrors alone, or rooms within walls beside others.
+ * phi is fixed up to a constant, and rounding must not become one.
+ */
+void cancelling(Suite& suite)
+{
+  int solved = 0;
+  const int runs = 120;
+  for (int run = 0; run < runs; ++run)
+  {
+    std::mt19937 random(static_cast<unsigned int>(run));
+    std::uniform_real_distribution<double> uniform(0., 1.);
+    DiffusionScene scene({ { 5 + run % 7, 4 + run % 5, 1 + run % 6 } }, { { 1., 0.4, 1.7 } });
+    scene.boundary = Boundary::ZeroFlux;
+    const int n = scene.grid.dims[0];
+    const double contrast = 5. * uniform(random);
+    std::vector<std::uint8_t> outside(scene.q.size(), 0);
+    const int wall = run % 3 == 0 ? n : 2;
+    for (std::size_t i = 0; i < scene.q.size(); ++i)
+    {
+      const int x = static_cast<int>(i % static_cast<std::size_t>(n));
+      scene.D[i] = x == wall && run % 3 == 1 ? 0. : std::pow(10., -contrast * uniform(random));
+      outside[i] = x == wall && run % 3 == 2;
+      scene.sigma_a[i] = x > wall ? 0.1 : 0.; // of the other room
+    }
+    scene.q[0] = 1.;
+    scene.q[1 + static_cast<std::size_t>(n) * (scene.q.size() / static_cast<std::size_t>(n) - 1)] =
+      -1.;
+    DiffusionMedium<double> medium = scene.medium();
+    medium.outside = outside.data();
+    if (run % 3 != 2)
+    {
+      medium.outside = nullptr;
+    }
+    DiffusionSolver solver;
+    solver.setMedium(medium);
+    DiffusionControl control;
+    control.maxIterations = 50;
+    const DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+    const std::string name = "cancelling " + std::to_string(run) + ": " + ToString(report.reason);
+    suite.check(report.reason == StopReason::Converged, name, __FILE__, __LINE__);
+    double sum = 0.;
+    double most = 0.;
+    bool dark = true;
+    for (std::size_t i = 0; i < scene.q.size(); ++i)
+    {
+      sum += scene.phi[i];
+      most = std::max(most, std::abs(scene.phi[i]));
+      dark =
+        dark && (static_cast<int>(i % static_cast<std::size_t>(n)) <= wall || scene.phi[i] == 0.);
+    }
+    suite.check(dark, name + ", the other room is dark", __FILE__, __LINE__);
+    suite.check(std::abs(sum) <= 1e-9 * most * static_cast<double>(scene.q.size()), name + ", mean",
+      __FILE__, __LINE__);
+    solved += report.reason == StopReason::Converged;
+    // and the same medium solves another scene after that
+    scene.q.assign(scene.q.size(), 0.);
+    if (wall < n - 1)
+    {
+      scene.q[static_cast<std::size_t>(n) - 1] = 1.;
+      const DiffusionReport next = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
+      suite.check(next.reason == StopReason::Converged &&
+          std::abs(next.absorbed + next.escaped - next.emitted) <= 1e-6 * next.emitted,
+        name + ", then another", __FILE__, __LINE__);
+    }
+  }
+  std::cout << solved << " of " << runs << " cancelling scenes solved\n";
+}
+
 /** A NaN appears in the field while a solver works on it: it is seen, and never called solved. */
 void notFinite(Suite& suite)
 {
@@ -640,6 +709,7 @@ int main(int argc, char* argv[])
   honest(suite);
   layers(suite);
   early(suite);
+  cancelling(suite);
   easySteps(suite);
   notFinite(suite);
   hardMedia(suite);
