@@ -282,7 +282,7 @@ private:
   /**
    * Where all sources are of one sign, so is the exact answer: what is of the other one beyond
    * the tolerance or 1e-7 (of the largest |phi|) becomes 0, and the solve goes on from there,
-   * where it was not at its end: then the residual is told again.
+   * where it was not at its end or for a named error: then the residual is told again.
    */
   template <class T>
   void keepSign(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
@@ -336,8 +336,12 @@ private:
   void boundaryOf(Boundary boundary);
   std::int64_t borderIndex(int d, const int at[3]) const;
 
-  /** 95th percentile and L2 norm of the error, were it `step` z. */
-  void estimateError(const double* phi, const float* z, double step, DiffusionReport& report) const;
+  /**
+   * 95th percentile and L2 norm of the error, were it `scaled` z times `factor` in L2, and times
+   * its root in the percentile.
+   */
+  void estimateError(
+    const double* phi, const float* z, double scaled, double factor, DiffusionReport& report) const;
 
   ParallelFor parallelFor;
   Grid volume;                              ///< the medium's
