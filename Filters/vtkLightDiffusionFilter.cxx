@@ -12,6 +12,7 @@
 #include "vtkOpticalMediumFilter.h"
 
 #include "vtkCellData.h"
+#include "vtkCommand.h"
 #include "vtkDataArrayRange.h"
 #include "vtkDataSetAttributes.h"
 #include "vtkDoubleArray.h"
@@ -32,8 +33,10 @@
 #include "vtkWeakPointer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <list>
 #include <new>
@@ -44,6 +47,9 @@ vtkStandardNewMacro(vtkLightDiffusionFilter);
 
 namespace
 {
+using lighttransport::ParallelFor;
+using lighttransport::WatchedFor;
+
 static_assert(
   static_cast<int>(lighttransport::StopReason::BadInput) == vtkLightDiffusionFilter::BadInput,
   "the filter's reasons are the core's");
@@ -124,17 +130,56 @@ double largestOf(
 
 /** The array's values as they lie in memory, or converted where their type is another. */
 template <class T, class ArrayT>
-const T* valuesOf(vtkDataArray* array, std::vector<T>& converted)
+const T* valuesOf(
+  vtkDataArray* array, lighttransport::Buffer<T>& converted, const WatchedFor& parallel)
 {
   if (auto typed = ArrayT::FastDownCast(array))
   {
     return typed->GetPointer(0);
   }
-  converted.resize(static_cast<std::size_t>(array->GetNumberOfTuples()));
-  const auto range = vtk::DataArrayValueRange<1>(array);
-  std::transform(range.begin(), range.end(), converted.begin(),
-    [](double value) { return static_cast<T>(value); });
+  converted.allocate(array->GetNumberOfTuples());
+  parallel(converted.size(),
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      const auto range = vtk::DataArrayValueRange<1>(array, begin, end);
+      std::transform(range.begin(), range.end(), converted.data() + begin,
+        [](double value) { return static_cast<T>(value); });
+    });
   return converted.data();
+}
+
+/**
+ * The field in the array that the output gets, and its largest magnitude; what float cannot hold
+ * is cut off there.
+ */
+template <class ArrayT>
+double fill(ArrayT* array, const double* phi, vtkIdType size, const ParallelFor& parallel)
+{
+  using Value = typename ArrayT::ValueType;
+  array->SetNumberOfTuples(size);
+  Value* to = array->GetPointer(0);
+  lighttransport::PreferLargePages(to, static_cast<std::size_t>(size) * sizeof(Value));
+  constexpr double limit = static_cast<double>(std::numeric_limits<Value>::max());
+  constexpr vtkIdType piece = 16384;
+  std::vector<double> most(static_cast<std::size_t>((size + piece - 1) / piece), 0.);
+  parallel(static_cast<std::int64_t>(most.size()),
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t p = begin; p < end; ++p)
+      {
+        double above = 0.;
+        double below = 0.;
+        for (vtkIdType i = p * piece; i < std::min<vtkIdType>(size, (p + 1) * piece); ++i)
+        {
+          const double v = phi[i];
+          above = v > above ? v : above;
+          below = v < below ? v : below;
+          to[i] = static_cast<Value>(v > limit ? limit : v < -limit ? -limit : v);
+        }
+        most[static_cast<std::size_t>(p)] = std::max(above, -below);
+      }
+    });
+  return *std::max_element(most.begin(), most.end());
 }
 } // namespace
 
@@ -150,8 +195,8 @@ struct vtkLightDiffusionFilter::State
   std::list<Solution> solutions; // the last used first; of the operator that is kept
 
   /** phi = the sum of the spheres' fields, those that are not kept solved for first. */
-  lighttransport::DiffusionReport superpose(
-    vtkDataArray* spheres, double* phi, const lighttransport::DiffusionControl& control, int most);
+  lighttransport::DiffusionReport superpose(vtkDataArray* spheres, double* phi,
+    const lighttransport::DiffusionControl& control, int most, const WatchedFor& parallel);
 
   State()
     : solver(vtkLightTransportParallelFor())
@@ -164,8 +209,8 @@ struct vtkLightDiffusionFilter::State
   MediumKey coarseKey;
   int coarseFactor = 0;
   // What the solver looks at again while the key holds, where the arrays themselves do not serve.
-  std::vector<std::uint8_t> outside;
-  std::vector<double> storedD, storedSigma;
+  lighttransport::Buffer<std::uint8_t> outside;
+  lighttransport::Buffer<double> storedD, storedSigma;
   MediumKey key;
   bool valid = false;                 // the solver's operator is that of the key
   lighttransport::Buffer<double> phi; // the last state, where Continue asks for it
@@ -175,16 +220,17 @@ struct vtkLightDiffusionFilter::State
 };
 
 //------------------------------------------------------------------------------
-lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(
-  vtkDataArray* spheres, double* phi, const lighttransport::DiffusionControl& control, int most)
+lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(vtkDataArray* spheres,
+  double* phi, const lighttransport::DiffusionControl& control, int most,
+  const WatchedFor& parallel)
 {
   using namespace lighttransport;
   DiffusionReport all;
   all.reason = StopReason::Converged;
   const Grid grid = this->solver.grid();
   const std::int64_t size = grid.size();
-  const ParallelFor parallel = vtkLightTransportParallelFor();
-  std::fill(phi, phi + size, 0.);
+  parallel.whole()(
+    size, [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
   int used = 0;
   for (vtkIdType s = 0; s < spheres->GetNumberOfTuples() && used < most; ++s)
   {
@@ -208,7 +254,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(
       Solution one;
       one.sphere = sphere;
       one.phi.allocate(size);
-      std::vector<float> q(static_cast<std::size_t>(size));
+      Buffer<float> q(size);
       const SourceReport sources = ComputeSources(grid, { sphere }, {}, q.data(), parallel, {});
       if (sources.badSphere >= 0 || sources.badVoxel >= 0)
       {
@@ -234,7 +280,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(
     }
     ++used;
     const double* field = this->solutions.front().phi.data();
-    parallel(size,
+    parallel.whole()(size,
       [&](std::int64_t begin, std::int64_t end)
       {
         for (std::int64_t i = begin; i < end; ++i)
@@ -242,6 +288,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(
           phi[i] += power * field[i];
         }
       });
+    parallel.poll();
   }
   while (static_cast<int>(this->solutions.size()) > most)
   {
@@ -456,7 +503,19 @@ int vtkLightDiffusionFilter::RequestData(
   {
     try
     {
-      ok = this->CheckParameters(problem) && this->Solve(input, output, problem);
+      const auto solve = [&]
+      {
+        try
+        {
+          return this->Solve(input, output, problem);
+        }
+        catch (const lighttransport::Interrupted&)
+        {
+          this->WriteStart(input, output);
+          return true;
+        }
+      };
+      ok = this->CheckParameters(problem) && solve();
     }
     catch (const std::bad_alloc&)
     {
@@ -488,6 +547,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   State& kept = *this->Kept;
 
   const auto began = std::chrono::steady_clock::now();
+  // Told and asked while anything lasts: Interrupted where the answer is to stop.
+  const lighttransport::DiffusionProgress progress = [this](double fraction)
+  {
+    this->UpdateProgress(std::max(fraction, this->GetProgress()));
+    return !vtkLightTransportCheckAbort(this);
+  };
+  const WatchedFor parallel(vtkLightTransportParallelFor());
+  const WatchedFor::Asking asking(parallel, progress);
 
   // 1. check the input
   std::ostringstream text;
@@ -574,7 +641,15 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
         ? vtkOpticalMediumFilter::Rational
         : vtkOpticalMediumFilter::Exponential);
     medium->SetGradientScale(this->GradientScale);
+    const unsigned long tag =
+      medium->AddObserver(vtkCommand::ProgressEvent, this, &vtkLightDiffusionFilter::PassAbort);
     medium->Update();
+    medium->RemoveObserver(tag);
+    if (medium->GetAbortExecute())
+    {
+      medium->Modified(); // half of it
+      throw lighttransport::Interrupted();
+    }
     this->ComputedGradientScale = medium->GetComputedGradientScale();
     D = medium->GetOutput()->GetPointData()->GetArray(names::DiffusionCoefficient);
     if (!D)
@@ -593,35 +668,49 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
   }
   vtkUnsignedCharArray* ghosts = input->GetPointGhostArray();
-  std::vector<std::uint8_t> outside;
+  const std::uint8_t* outside = nullptr;
   if (ghosts && ghosts->GetNumberOfTuples() == size)
   {
+    const unsigned char* flags = ghosts->GetPointer(0);
     constexpr unsigned char hidden = vtkDataSetAttributes::HIDDENPOINT;
-    for (vtkIdType i = 0; i < size; ++i)
-    {
-      if (ghosts->GetValue(i) & hidden)
+    std::atomic<bool> any{ false };
+    parallel(size,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        outside.resize(static_cast<std::size_t>(size), 0);
-        outside[static_cast<std::size_t>(i)] = 1;
+        any = any ||
+          std::any_of(flags + begin, flags + end, [](unsigned char f) { return f & hidden; });
+      });
+    if (any)
+    {
+      // in place: a solver that is kept looks at it
+      if (kept.outside.size() != size)
+      {
+        kept.outside.allocate(size);
       }
+      parallel.whole()(size,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          std::transform(flags + begin, flags + end, kept.outside.data() + begin,
+            [](unsigned char f) { return static_cast<std::uint8_t>(f & hidden ? 1 : 0); });
+        });
+      outside = kept.outside.data();
     }
   }
 
   // Double sources stay double; all others are float.
   const bool doubleSource = source->GetDataType() != VTK_FLOAT;
-  std::vector<float> floatStore;
-  std::vector<double> doubleStore;
+  lighttransport::Buffer<float> floatStore;
+  lighttransport::Buffer<double> doubleStore;
   const float* qFloat = nullptr;
   const double* qDouble = nullptr;
   if (doubleSource)
   {
-    qDouble = valuesOf<double, vtkDoubleArray>(source, doubleStore);
+    qDouble = valuesOf<double, vtkDoubleArray>(source, doubleStore, parallel);
   }
   else
   {
-    qFloat = valuesOf<float, vtkFloatArray>(source, floatStore);
+    qFloat = valuesOf<float, vtkFloatArray>(source, floatStore, parallel);
   }
-  const auto parallel = vtkLightTransportParallelFor();
   vtkIdType bad = -1;
   const double largest =
     doubleSource ? largestOf(qDouble, size, parallel, bad) : largestOf(qFloat, size, parallel, bad);
@@ -644,29 +733,31 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     problem = text.str();
     return false;
   }
-  if (!outside.empty())
+  if (outside)
   {
     // Light does not start outside the domain.
+    const auto cut = [&](const auto*& q, auto& store)
+    {
+      using Value = std::decay_t<decltype(*q)>;
+      lighttransport::Buffer<Value> inside(size);
+      parallel(size,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          for (std::int64_t i = begin; i < end; ++i)
+          {
+            inside[i] = outside[i] ? Value(0) : q[i];
+          }
+        });
+      store = std::move(inside);
+      q = store.data();
+    };
     if (doubleSource)
     {
-      doubleStore.assign(qDouble, qDouble + size);
-      qDouble = doubleStore.data();
+      cut(qDouble, doubleStore);
     }
     else
     {
-      floatStore.assign(qFloat, qFloat + size);
-      qFloat = floatStore.data();
-    }
-    for (std::size_t i = 0; i < outside.size(); ++i)
-    {
-      if (outside[i] && doubleSource)
-      {
-        doubleStore[i] = 0.;
-      }
-      else if (outside[i])
-      {
-        floatStore[i] = 0.f;
-      }
+      cut(qFloat, floatStore);
     }
   }
 
@@ -698,26 +789,33 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       medium.grid.spacing = { { spacing[0], spacing[1], spacing[2] } };
       medium.D = d;
       medium.sigma_a = s;
-      kept.outside = outside;
-      medium.outside = outside.empty() ? nullptr : kept.outside.data();
+      medium.outside = outside;
       medium.boundary = static_cast<lighttransport::Boundary>(this->Boundary);
       medium.refractiveIndexRatio = this->RefractiveIndexRatio;
       return action(medium);
     };
     if (D->GetDataType() == VTK_FLOAT && (!sigma_a || sigma_a->GetDataType() == VTK_FLOAT))
     {
-      std::vector<float> unused;
-      return act(0.f, valuesOf<float, vtkFloatArray>(D, unused),
-        sigma_a ? valuesOf<float, vtkFloatArray>(sigma_a, unused) : nullptr);
+      lighttransport::Buffer<float> unused;
+      return act(0.f, valuesOf<float, vtkFloatArray>(D, unused, parallel),
+        sigma_a ? valuesOf<float, vtkFloatArray>(sigma_a, unused, parallel) : nullptr);
     }
-    return act(0., valuesOf<double, vtkDoubleArray>(D, kept.storedD),
-      sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, kept.storedSigma) : nullptr);
+    return act(0., valuesOf<double, vtkDoubleArray>(D, kept.storedD, parallel),
+      sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, kept.storedSigma, parallel) : nullptr);
+  };
+  const auto orInterrupt = [](const DiffusionReport& report)
+  {
+    if (report.reason == lighttransport::StopReason::Cancelled)
+    {
+      throw lighttransport::Interrupted();
+    }
   };
   double setupSeconds = 0.;
   const auto setUp = [&](auto& solver)
   {
     const DiffusionReport report =
-      withMedium([&](const auto& medium) { return solver.setMedium(medium); });
+      withMedium([&](const auto& medium) { return solver.setMedium(medium, progress); });
+    orInterrupt(report);
     setupSeconds += report.seconds;
     problem = report.reason == lighttransport::StopReason::Converged ? "" : report.message;
     return problem.empty();
@@ -747,8 +845,9 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     {
       kept.coarse.reset();
       auto made = std::make_unique<lighttransport::CoarseDiffusion>(vtkLightTransportParallelFor());
-      const DiffusionReport report =
-        withMedium([&](const auto& medium) { return made->setMedium(medium, factor); });
+      const DiffusionReport report = withMedium(
+        [&](const auto& medium) { return made->setMedium(medium, factor, false, progress); });
+      orInterrupt(report);
       if (report.reason != lighttransport::StopReason::Converged)
       {
         problem = report.message;
@@ -766,9 +865,13 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
   const bool bounds = !moment && !coarse && !active && !chosen;
   this->PositivityBound = bounds ? kept.solver.positivityBound() : 0.;
-  this->StabilityBound = moment ? kept.moment->stabilityBound()
+  this->StabilityBound = moment ? kept.moment->stabilityBound(progress)
     : bounds                    ? kept.solver.stabilityBound()
                                 : 0.;
+  if (moment && this->StabilityBound == 0.)
+  {
+    throw lighttransport::Interrupted();
+  }
 
   // 3. solve
   lighttransport::Buffer<double> phi;
@@ -792,10 +895,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
     if (anisotropic)
     {
-      for (vtkIdType i = 0; i < size; ++i)
-      {
-        phi[i] = doubleSource ? qDouble[i] : static_cast<double>(qFloat[i]);
-      }
+      parallel(size,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          for (std::int64_t i = begin; i < end; ++i)
+          {
+            phi[i] = doubleSource ? qDouble[i] : static_cast<double>(qFloat[i]);
+          }
+        });
     }
   }
   kept.phi.release();
@@ -803,11 +910,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   control.tolerance = this->Tolerance;
   control.maxIterations = this->MaximumNumberOfIterations;
   control.implicitScheme = static_cast<lighttransport::ImplicitScheme>(this->ImplicitScheme);
-  control.progress = [this](double fraction)
-  {
-    this->UpdateProgress(fraction);
-    return !vtkLightTransportCheckAbort(this);
-  };
+  control.progress = progress;
   control.targetError = this->TargetError;
   // what is left of the budget, but for writing the output
   const auto timeLeft = [&]
@@ -818,17 +921,11 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   if (this->IntermediateInterval > 0.)
   {
     control.intermediateInterval = this->IntermediateInterval;
-    control.intermediate = [this, input, size](const double* reached)
+    control.intermediate = [this, input, size, &parallel](const double* reached)
     {
       vtkNew<vtkFloatArray> array;
       array->SetName(names::Fluence);
-      array->SetNumberOfTuples(size);
-      std::transform(reached, reached + size, array->GetPointer(0),
-        [](double value)
-        {
-          const double limit = static_cast<double>(std::numeric_limits<float>::max());
-          return static_cast<float>(std::min(limit, std::max(-limit, value)));
-        });
+      fill(array.Get(), reached, size, parallel.whole());
       this->IntermediateOutput = vtkSmartPointer<vtkImageData>::New();
       this->IntermediateOutput->CopyStructure(input);
       this->IntermediateOutput->GetPointData()->SetScalars(array);
@@ -869,7 +966,9 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       }
       if (failed)
       {
-        std::fill(phi.data(), phi.data() + size, 0.);
+        parallel.whole()(size,
+          [&](std::int64_t begin, std::int64_t end)
+          { std::fill(phi.data() + begin, phi.data() + end, 0.); });
       }
       setupSeconds += before.seconds;
       before.reason = lighttransport::StopReason::BadInput;
@@ -890,7 +989,8 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     if (hasty)
     {
       lighttransport::CoarseDiffusion preview(vtkLightTransportParallelFor());
-      before = withMedium([&](const auto& medium) { return preview.setMedium(medium, 4, true); });
+      before = withMedium(
+        [&](const auto& medium) { return preview.setMedium(medium, 4, true, progress); });
       if (before.reason != lighttransport::StopReason::Converged)
       {
         return before;
@@ -919,8 +1019,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
     if (local)
     {
-      return kept.solver.stepLocal(
-        q, phi.data(), this->NumberOfSteps, this->CourantNumber, control);
+      return kept.solver.stepLocal(q, phi, this->NumberOfSteps, this->CourantNumber, control);
     }
     if (coarse)
     {
@@ -964,21 +1063,21 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     switch (this->Mode)
     {
       case Explicit:
-        return kept.solver.stepExplicit(
-          q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
+        return kept.solver.stepExplicit(q, phi, this->NumberOfSteps, this->UsedTimeStep, control);
       case Implicit:
         return kept.solver.stepImplicit(
           q, phi.data(), this->NumberOfSteps, this->UsedTimeStep, control);
       default:
       {
         vtkDataArray* spheres = input->GetFieldData()->GetArray(names::LightSeeds);
-        if (!this->KeepSolutions || !outside.empty() || !spheres ||
-          spheres->GetNumberOfComponents() != 5 || spheres->GetNumberOfTuples() == 0)
+        if (!this->KeepSolutions || outside || !spheres || spheres->GetNumberOfComponents() != 5 ||
+          spheres->GetNumberOfTuples() == 0)
         {
           return kept.solver.solveSteady(q, phi.data(), control);
         }
-        const DiffusionReport parts =
-          kept.superpose(spheres, phi.data(), control, this->MaximumNumberOfKeptSolutions);
+        const DiffusionReport parts = kept.superpose(
+          spheres, phi.data(), control, this->MaximumNumberOfKeptSolutions, parallel);
+        orInterrupt(parts);
         // The rest (paint, strokes) and the check of the residual.
         DiffusionReport sum = kept.solver.solveSteady(q, phi.data(), control);
         sum.iterations += parts.iterations;
@@ -990,13 +1089,22 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
   };
   DiffusionReport report;
-  if (anisotropic)
+  try
   {
-    report = solve(static_cast<const float*>(nullptr));
+    if (anisotropic)
+    {
+      report = solve(static_cast<const float*>(nullptr));
+    }
+    else
+    {
+      report = doubleSource ? solve(qDouble) : solve(qFloat);
+    }
   }
-  else
+  catch (const lighttransport::Interrupted&)
   {
-    report = doubleSource ? solve(qDouble) : solve(qFloat);
+    report.reason = lighttransport::StopReason::Cancelled;
+    report.message = "cancelled between two solves";
+    report.residual = -1.;
   }
   this->StopReason = static_cast<int>(report.reason);
   this->Message = report.message;
@@ -1044,87 +1152,85 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
 
   // 4. the arrays
-  const double extreme = largestOf(phi.data(), size, parallel, bad);
-  if (!toDouble && extreme > static_cast<double>(std::numeric_limits<float>::max()))
-  {
-    text << "the fluence reaches " << extreme
-         << ", which float cannot hold; expected OutputPrecision = DOUBLE_PRECISION, or less power";
-    problem = text.str();
-    this->StopReason = NotFinite; // as a float
-    return false;
-  }
-  output->ShallowCopy(input);
   vtkSmartPointer<vtkDataArray> fluence;
   if (toDouble)
   {
     vtkNew<vtkDoubleArray> array;
-    array->SetNumberOfTuples(size);
-    double* to = array->GetPointer(0);
-    parallel(size,
-      [&](std::int64_t begin, std::int64_t end)
-      { std::copy(phi.data() + begin, phi.data() + end, to + begin); });
+    fill(array.Get(), phi.data(), size, parallel.whole());
     fluence = array;
   }
   else
   {
     vtkNew<vtkFloatArray> array;
-    array->SetNumberOfTuples(size);
-    float* to = array->GetPointer(0);
-    parallel(size,
-      [&](std::int64_t begin, std::int64_t end)
-      {
-        std::transform(phi.data() + begin, phi.data() + end, to + begin,
-          [](double value) { return static_cast<float>(value); });
-      });
+    const double extreme = fill(array.Get(), phi.data(), size, parallel.whole());
+    if (extreme > static_cast<double>(std::numeric_limits<float>::max()))
+    {
+      text << "the fluence reaches " << extreme
+           << ", which float cannot hold; expected OutputPrecision = DOUBLE_PRECISION, or less "
+              "power";
+      problem = text.str();
+      this->StopReason = NotFinite; // as a float
+      return false;
+    }
     fluence = array;
   }
+  output->ShallowCopy(input);
   fluence->SetName(names::Fluence);
   output->GetPointData()->AddArray(fluence);
-  if (this->ComputeFlux)
+  // Who cancels gets the fluence at once, and it alone.
+  const auto addFlux = [&](auto&& array)
   {
     if ((coarse || chosen) && !setUpFull()) // the faces
     {
       return false;
     }
-    const auto write = [&](auto* array)
+    array->SetName(names::Flux);
+    array->SetNumberOfComponents(3);
+    array->SetNumberOfTuples(size);
+    auto* E = array->GetPointer(0);
+    using Value = std::remove_pointer_t<decltype(E)>;
+    lighttransport::PreferLargePages(E, 3 * static_cast<std::size_t>(size) * sizeof(Value));
+    if (!(moment ? kept.moment->flux(phi.data(), E, progress)
+                 : kept.solver.flux(phi.data(), E, progress)))
     {
-      array->SetName(names::Flux);
-      array->SetNumberOfComponents(3);
-      array->SetNumberOfTuples(size);
-      auto* E = array->GetPointer(0);
-      if (moment)
-      {
-        kept.moment->flux(phi.data(), E);
-      }
-      else
-      {
-        kept.solver.flux(phi.data(), E);
-      }
-      vtkMatrix3x3* direction = input->GetDirectionMatrix();
-      if (!direction->IsIdentity())
-      {
-        using Value = std::remove_pointer_t<decltype(E)>;
-        for (vtkIdType i = 0; i < size; ++i)
-        {
-          const double along[3] = { static_cast<double>(E[3 * i]),
-            static_cast<double>(E[3 * i + 1]), static_cast<double>(E[3 * i + 2]) };
-          double world[3];
-          direction->MultiplyPoint(along, world);
-          for (int d = 0; d < 3; ++d)
-          {
-            E[3 * i + d] = static_cast<Value>(world[d]);
-          }
-        }
-      }
-      output->GetPointData()->AddArray(array);
-    };
-    if (toDouble)
-    {
-      write(vtkSmartPointer<vtkDoubleArray>::New().Get());
+      throw lighttransport::Interrupted();
     }
-    else
+    vtkMatrix3x3* direction = input->GetDirectionMatrix();
+    if (!direction->IsIdentity())
     {
-      write(vtkSmartPointer<vtkFloatArray>::New().Get());
+      parallel(size,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          for (std::int64_t i = begin; i < end; ++i)
+          {
+            const double along[3] = { static_cast<double>(E[3 * i]),
+              static_cast<double>(E[3 * i + 1]), static_cast<double>(E[3 * i + 2]) };
+            double world[3];
+            direction->MultiplyPoint(along, world);
+            for (int d = 0; d < 3; ++d)
+            {
+              E[3 * i + d] = static_cast<Value>(world[d]);
+            }
+          }
+        });
+    }
+    output->GetPointData()->AddArray(array);
+    return true;
+  };
+  if (this->ComputeFlux && this->StopReason != Cancelled)
+  {
+    try
+    {
+      if (!(toDouble ? addFlux(vtkSmartPointer<vtkDoubleArray>::New())
+                     : addFlux(vtkSmartPointer<vtkFloatArray>::New())))
+      {
+        return false;
+      }
+    }
+    catch (const lighttransport::Interrupted&)
+    {
+      this->StopReason = Cancelled;
+      this->Message = "cancelled before the flux was there; the fluence is the one solved for";
     }
   }
   output->GetPointData()->SetActiveScalars(names::Fluence);
@@ -1149,6 +1255,51 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     kept.phi = std::move(phi);
   }
   return true;
+}
+
+//------------------------------------------------------------------------------
+void vtkLightDiffusionFilter::WriteStart(vtkImageData* input, vtkImageData* output)
+{
+  const vtkIdType size = input->GetNumberOfPoints();
+  this->StopReason = Cancelled;
+  this->Message = "cancelled before the solve began; the field is the one before";
+  this->Residual = -1.;
+  vtkSmartPointer<vtkDataArray> fluence = vtk::TakeSmartPointer(vtkDataArray::CreateDataArray(
+    this->OutputPrecision == DOUBLE_PRECISION ? VTK_DOUBLE : VTK_FLOAT));
+  const lighttransport::Buffer<double>& last = this->Kept->phi;
+  if (this->Continue && last.size() == size)
+  {
+    const ParallelFor parallel = vtkLightTransportParallelFor();
+    auto* narrow = vtkFloatArray::FastDownCast(fluence);
+    narrow ? fill(narrow, last.data(), size, parallel)
+           : fill(vtkDoubleArray::FastDownCast(fluence), last.data(), size, parallel);
+  }
+  else
+  {
+    // zeros that are no memory until they are read
+    void* zeros = std::calloc(
+      static_cast<std::size_t>(size), static_cast<std::size_t>(fluence->GetDataTypeSize()));
+    if (!zeros)
+    {
+      throw std::bad_alloc();
+    }
+    fluence->SetVoidArray(zeros, size, 0, vtkAbstractArray::VTK_DATA_ARRAY_FREE);
+  }
+  fluence->SetName(vtkLightTransportArrays::Fluence);
+  output->ShallowCopy(input);
+  output->GetPointData()->AddArray(fluence);
+  output->GetPointData()->SetActiveScalars(vtkLightTransportArrays::Fluence);
+  this->WriteReport(output);
+}
+
+//------------------------------------------------------------------------------
+void vtkLightDiffusionFilter::PassAbort(vtkObject* inner, unsigned long, void*)
+{
+  this->UpdateProgress(this->GetProgress());
+  if (vtkLightTransportCheckAbort(this))
+  {
+    vtkAlgorithm::SafeDownCast(inner)->SetAbortExecute(1);
+  }
 }
 
 //------------------------------------------------------------------------------

@@ -369,7 +369,9 @@ public:
   /**
    * The report of the last execution. Only Converged says that the tolerance is met. MaxIterations
    * of time steps says that all of them were made. After Cancelled, MaxIterations and Breakdown the
-   * output holds the best answer reached.
+   * output holds the best answer reached; after Cancelled, which comes some 30 ms after
+   * AbortExecute, without Flux and powers, and where nothing was reached yet it holds the last
+   * state (with Continue) or darkness.
    */
   vtkGetMacro(StopReason, int);
   const char* GetStopReasonAsString() const;
@@ -377,7 +379,10 @@ public:
   const char* GetMessage() const { return this->Message.c_str(); }
   /** Iterations of the linear solver; Explicit: steps. */
   vtkGetMacro(NumberOfIterationsUsed, int);
-  /** |b - A phi| / |b| of the steady equation, recomputed in double from the answer. */
+  /**
+   * |b - A phi| / |b| of the steady equation, recomputed in double from the answer; after Cancelled
+   * not recomputed, and negative where it is not known.
+   */
   vtkGetMacro(Residual, double);
   vtkGetMacro(SolveSeconds, double);
   /** Held at the most while solving, beyond the input's and output's arrays. */
@@ -434,6 +439,9 @@ private:
 
   bool CheckParameters(std::string& problem) const;
   bool Solve(vtkImageData* input, vtkImageData* output, std::string& problem);
+  /** The output of an execution that was cancelled before there was a field. */
+  void WriteStart(vtkImageData* input, vtkImageData* output);
+  void PassAbort(vtkObject* inner, unsigned long event, void* data);
   void WriteReport(vtkImageData* output) const;
   void ClearReport();
 

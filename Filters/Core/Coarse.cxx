@@ -199,7 +199,25 @@ void CoarseDiffusion::load(std::int64_t row, float* D, float* s) const
 //------------------------------------------------------------------------------
 template <class T>
 DiffusionReport CoarseDiffusion::setMedium(
-  const DiffusionMedium<T>& medium, int factor, bool inHaste)
+  const DiffusionMedium<T>& medium, int factor, bool inHaste, const DiffusionProgress& progress)
+{
+  const WatchedFor::Asking asking(this->parallelFor, progress);
+  const WatchedFor::Asking inner(this->solver.parallelFor, progress);
+  try
+  {
+    return this->prepare(medium, factor, inHaste);
+  }
+  catch (const Interrupted&)
+  {
+    DiffusionReport report;
+    report.reason = StopReason::Cancelled;
+    report.message = "cancelled while setting up";
+    return report;
+  }
+}
+
+template <class T>
+DiffusionReport CoarseDiffusion::prepare(const DiffusionMedium<T>& medium, int factor, bool inHaste)
 {
   const double began = now();
   DiffusionReport report = this->solver.check(medium);
@@ -877,7 +895,7 @@ void CoarseDiffusion::prolong(const double* x, double* phi) const
   const std::array<int, 3>& n = this->fine.dims;
   const std::array<int, 3>& nc = this->coarse.dims;
   const std::int64_t rows = static_cast<std::int64_t>(n[1]) * n[2];
-  ForRows(this->parallelFor, rows, this->fine.size(),
+  ForRows(this->parallelFor.whole(), rows, this->fine.size(),
     [&](std::int64_t begin, std::int64_t end)
     {
       const std::size_t length = static_cast<std::size_t>(n[0]);
@@ -1105,6 +1123,10 @@ bool CoarseDiffusion::escapes(
     for (std::size_t next = 0; next < visited.size() && !sink; ++next)
     {
       const std::int64_t i = visited[next];
+      if (next % 65536 == 65535)
+      {
+        this->parallelFor.poll();
+      }
       sum += static_cast<double>(q[i]);
       magnitude += std::abs(static_cast<double>(q[i]));
       sink = medium.sigma_a && static_cast<double>(medium.sigma_a[i]) > 1e-30 * this->scale;
@@ -1152,6 +1174,31 @@ DiffusionReport CoarseDiffusion::solve(
   const Q* q, double* phi, const DiffusionControl& control, bool fromPhi)
 {
   const double began = now();
+  const WatchedFor::Asking asking(this->parallelFor, control.progress);
+  DiffusionReport report;
+  try
+  {
+    this->correct(q, phi, control, fromPhi, report);
+  }
+  catch (const Interrupted&)
+  {
+    report.reason = StopReason::Cancelled;
+  }
+  if (report.reason == StopReason::Cancelled) // at once: neither residual nor powers
+  {
+    report.residual = -1.;
+    report.message = "cancelled; the field is that after the last correction or sweep";
+  }
+  report.bytes += this->bytes();
+  report.seconds = now() - began;
+  return report;
+}
+
+template <class Q>
+void CoarseDiffusion::correct(
+  const Q* q, double* phi, const DiffusionControl& control, bool fromPhi, DiffusionReport& report)
+{
+  const double began = now();
   const std::int64_t size = this->fine.size();
   if (this->before.size() != size)
   {
@@ -1166,14 +1213,13 @@ DiffusionReport CoarseDiffusion::solve(
   DiffusionControl own;
   own.maxIterations = control.maxIterations;
   own.progress = control.progress;
-  DiffusionReport report;
   if (this->anyWall &&
     !(this->floatMedium.D ? this->escapes(this->floatMedium, q, report)
                           : this->escapes(this->doubleMedium, q, report)))
   {
-    std::fill(phi, phi + size, 0.);
-    report.seconds = now() - began;
-    return report;
+    ForRows(this->parallelFor.whole(), size, size,
+      [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
+    return;
   }
   const auto solveCells = [&](double tolerance)
   {
@@ -1189,19 +1235,27 @@ DiffusionReport CoarseDiffusion::solve(
     return one.reason == StopReason::Converged || one.reason == StopReason::MaxIterations ||
       one.reason == StopReason::Breakdown;
   };
+  const auto copy = [size](const ParallelFor& loop, const double* from, double* to)
+  {
+    ForRows(loop, size, size,
+      [from, to](std::int64_t begin, std::int64_t end)
+      { std::copy(from + begin, from + end, to + begin); });
+  };
   bool whole = true; // phi is a field that may be shown
   double pass = 0.;  // seconds of a simple pass over the voxels
   const auto inTime = [&](double seconds)
   { return !this->hasty || now() - began + seconds < control.timeBudget; };
   if (!fromPhi)
   {
+    Touch(phi, size, this->parallelFor);
+    ForRows(this->parallelFor.whole(), size, size,
+      [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
     this->restrict(q, b.data());
-    std::fill(phi, phi + size, 0.);
     whole = solveCells(named ? 1e-5 : std::max(control.tolerance, 1e-8));
     const double solved = now();
     this->prolong(x.data(), phi);
     pass = now() - solved;
-    for (int i = 0; i < 2 && inTime(4. * pass); ++i)
+    for (int i = 0; whole && i < 2 && inTime(4. * pass); ++i)
     {
       this->relax(q, phi);
       report.fineApplications += 1.;
@@ -1236,7 +1290,7 @@ DiffusionReport CoarseDiffusion::solve(
     report.residual = this->residual(q, phi, kept.data());
     this->restrict(kept.data(), b.data());
     whole = solveCells(1e-2);
-    std::copy(phi, phi + size, kept.data());
+    copy(this->parallelFor, phi, kept.data());
     this->prolong(x.data(), phi);
     this->relax(q, phi);
     report.fineApplications += 4.;
@@ -1249,7 +1303,7 @@ DiffusionReport CoarseDiffusion::solve(
     if (i > 0 && change.l2 > last.l2)
     {
       // The cells' equations are too far from the voxels' here: the correction overshoots.
-      std::copy(kept.data(), kept.data() + size, phi);
+      copy(this->parallelFor.whole(), kept.data(), phi);
       shrinking = false;
       report.estimatedError = std::max(report.estimatedError, last.p95);
       report.estimatedErrorL2 = std::max(report.estimatedErrorL2, last.l2);
@@ -1347,10 +1401,11 @@ DiffusionReport CoarseDiffusion::solve(
                              : "a coarse grid's answer, see the estimated error";
     }
   }
+  if (report.reason == StopReason::Cancelled)
+  {
+    return;
+  }
   this->balance(q, phi, report);
-  report.bytes += this->bytes();
-  report.seconds = now() - began;
-  return report;
 }
 
 CoarseDiffusion::Change CoarseDiffusion::compare(const double* before, const double* phi) const
@@ -1463,7 +1518,8 @@ void CoarseDiffusion::balance(const Q* q, const double* phi, DiffusionReport& re
 }
 
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
-  template DiffusionReport CoarseDiffusion::setMedium<T>(const DiffusionMedium<T>&, int, bool);    \
+  template DiffusionReport CoarseDiffusion::setMedium<T>(                                          \
+    const DiffusionMedium<T>&, int, bool, const DiffusionProgress&);                               \
   template DiffusionReport CoarseDiffusion::solve<T>(                                              \
     const T*, double*, const DiffusionControl&, bool);
 LIGHTTRANSPORT_INSTANTIATE(float)

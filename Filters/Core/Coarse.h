@@ -43,7 +43,8 @@ public:
    * for a field that may be wrong by its own order. Its estimated error is 1, a guess.
    */
   template <class T>
-  DiffusionReport setMedium(const DiffusionMedium<T>& medium, int factor, bool inHaste = false);
+  DiffusionReport setMedium(const DiffusionMedium<T>& medium, int factor, bool inHaste = false,
+    const DiffusionProgress& progress = {});
 
   /**
    * phi: in, with fromPhi, the start; out, the answer reached. Without a named error or a time
@@ -62,6 +63,11 @@ public:
   std::int64_t bytes() const;
 
 private:
+  template <class T>
+  DiffusionReport prepare(const DiffusionMedium<T>& medium, int factor, bool inHaste);
+  template <class Q>
+  void correct(const Q* q, double* phi, const DiffusionControl& control, bool fromPhi,
+    DiffusionReport& report);
   /** Row r of the medium as floats: D in parts of the largest, sigma_a as it stands in A. */
   void load(std::int64_t row, float* D, float* s) const;
   int cells(int d, int cell) const
@@ -108,7 +114,7 @@ private:
   template <class Q>
   void restrict(const Q* q, double* b) const;
 
-  ParallelFor parallelFor;
+  WatchedFor parallelFor;
   Grid fine, coarse;
   std::array<int, 3> factors{ { 1, 1, 1 } };
   bool hasty = false;

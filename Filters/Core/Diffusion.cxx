@@ -641,21 +641,53 @@ std::int64_t DiffusionSolver::bytesHeld() const
 
 //------------------------------------------------------------------------------
 template <class T>
-DiffusionReport DiffusionSolver::setMedium(const DiffusionMedium<T>& medium)
+DiffusionReport DiffusionSolver::setMedium(
+  const DiffusionMedium<T>& medium, const DiffusionProgress& progress)
+{
+  return this->interruptible(progress,
+    [&](DiffusionReport& report)
+    {
+      report = this->check(medium);
+      if (report.reason != StopReason::Converged)
+      {
+        return;
+      }
+      if (this->isConstant)
+      {
+        this->describe(medium);
+      }
+      else
+      {
+        this->assemble(medium, {});
+      }
+      report.bytes = this->bytesHeld();
+    });
+}
+
+template <class Solve>
+DiffusionReport DiffusionSolver::interruptible(
+  const DiffusionProgress& progress, const Solve& solve)
 {
   const double began = now();
-  DiffusionReport report = this->check(medium);
-  if (report.reason == StopReason::Converged)
+  const WatchedFor::Asking asking(this->parallelFor, progress);
+  DiffusionReport report;
+  try
   {
-    if (this->isConstant)
+    solve(report);
+  }
+  catch (const Interrupted&)
+  {
+    if (!this->multigridReady)
     {
-      this->describe(medium);
+      this->multigrid.release(); // half of it
     }
-    else
+    report.reason = StopReason::Cancelled;
+    if (report.message.empty())
     {
-      this->assemble(medium, {});
+      report.message = report.iterations > 0
+        ? "cancelled; the residual is that of the last iteration, not recomputed"
+        : "cancelled before the first iteration; the field is the one before";
     }
-    report.bytes = this->bytesHeld();
   }
   report.seconds = now() - began;
   return report;
@@ -1105,23 +1137,32 @@ void DiffusionSolver::setShift(double value)
   {
     return;
   }
-  this->storeFaces();
-  const std::int64_t size = this->box.size();
-  if (this->sinkWithoutShift.empty())
+  if (this->shift != 0.)
   {
-    this->sinkWithoutShift.allocate(size);
-    std::copy(this->A.s.data(), this->A.s.data() + size, this->sinkWithoutShift.data());
-  }
-  for (std::int64_t i = 0; i < size; ++i)
-  {
-    this->A.s[i] = static_cast<float>(static_cast<double>(this->sinkWithoutShift[i]) + value);
-  }
-  if (value == 0.)
-  {
+    std::swap(this->A.s, this->sinkWithoutShift);
     this->sinkWithoutShift.release();
+    this->shift = 0.;
+    this->multigridReady = false;
   }
-  this->shift = value;
-  this->multigridReady = false;
+  if (value != 0.)
+  {
+    this->storeFaces();
+    const std::int64_t size = this->box.size();
+    const float* s = this->A.s.data();
+    Buffer<float> shifted(size);
+    ForRows(this->parallelFor, size, size,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t i = begin; i < end; ++i)
+        {
+          shifted[i] = static_cast<float>(static_cast<double>(s[i]) + value);
+        }
+      });
+    this->sinkWithoutShift = std::move(this->A.s);
+    this->A.s = std::move(shifted);
+    this->shift = value;
+    this->multigridReady = false;
+  }
 }
 
 void DiffusionSolver::prepareMultigrid(const ParallelFor& loop)
@@ -1143,7 +1184,15 @@ void DiffusionSolver::storeFaces()
       if (medium.D)
       {
         const auto same = medium;
-        this->assemble(same, {}, false);
+        try
+        {
+          this->assemble(same, {}, false);
+        }
+        catch (const Interrupted&)
+        {
+          this->forgetFaces(); // half of them
+          throw;
+        }
       }
     };
     again(this->floatMedium);
@@ -1470,9 +1519,14 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   const double began = now();
   const std::int64_t size = this->box.size();
   const double bNorm = this->norm(b);
+  const auto darken = [&]
+  {
+    ForRows(this->parallelFor.whole(), size, size,
+      [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
+  };
   if (bNorm == 0.)
   {
-    std::fill(phi, phi + size, 0.);
+    darken();
     report.residual = 0.;
     report.reason = StopReason::Converged;
     return;
@@ -1506,37 +1560,12 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   }
   if (control.progress && !control.progress(progressBegin))
   {
-    report.reason = StopReason::Cancelled;
-    return;
+    throw Interrupted();
   }
 
-  // Passes ask every 20 ms whether to go on, and end at once if not.
-  double fraction = progressBegin;
-  bool cancelled = false;
-  double asked = now();
-  const auto goOn = [&]
-  {
-    asked = now();
-    cancelled = cancelled || (control.progress && !control.progress(fraction));
-    return !cancelled;
-  };
-  const ParallelFor watched = [&](std::int64_t n, const RangeBody& body)
-  {
-    // pieces of about a million values of the finest grid
-    const std::int64_t piece =
-      std::max<std::int64_t>(64, (std::int64_t(1) << 20) / this->box.dims[0]);
-    for (std::int64_t begin = 0; begin < n && !cancelled; begin += piece)
-    {
-      const std::int64_t length = std::min(piece, n - begin);
-      this->parallelFor(
-        length, [&](std::int64_t f, std::int64_t t) { body(begin + f, begin + t); });
-      if (now() - asked > 0.02)
-      {
-        goOn();
-      }
-    }
-  };
-  const ParallelFor& loop = control.progress ? watched : this->parallelFor;
+  // Passes ask whether to go on; those that change phi do not.
+  const ParallelFor& loop = this->parallelFor;
+  this->parallelFor.tell(progressBegin);
 
   // A rough answer is had with less memory: faces are computed, and z and A p share theirs.
   const bool frugal = control.tolerance >= FrugalTolerance;
@@ -1548,29 +1577,8 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   {
     this->storeFaces();
   }
-  // A set-up that is given up half-way is none: what it has made goes.
-  struct GivenUp
-  {
-  };
-  try
-  {
-    this->prepareMultigrid(
-      [&](std::int64_t n, const RangeBody& body)
-      {
-        loop(n, body);
-        if (cancelled)
-        {
-          throw GivenUp();
-        }
-      });
-  }
-  catch (const GivenUp&)
-  {
-    this->multigrid = Multigrid();
-    report.reason = StopReason::Cancelled;
-    report.message = "cancelled while setting up; the field is the one before";
-    return;
-  }
+  this->prepareMultigrid(loop);
+  Touch(phi, size, this->parallelFor);
   const DiffusionOperator& op = this->A;
   Buffer<float> Ap(size, this->A.pages);
   Buffer<float> p(size, this->A.pages);
@@ -1617,12 +1625,6 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       report.reason = StopReason::NotFinite;
     }
   };
-  const auto cancel = [&]
-  {
-    report.residual = rNorm / bNorm;
-    report.reason = StopReason::Cancelled;
-    report.message = "cancelled; the residual is the recurrence's";
-  };
 
   for (int iteration = 0;; ++iteration)
   {
@@ -1636,11 +1638,6 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       [&](std::int64_t row, std::int64_t o, int n)
       { twoDots(n, z.data() + o, r.data() + o, Ap.data() + o, partial.data() + 2 * row); });
     report.fineApplications += 1. + 2. * this->multigrid.sweeps;
-    if (cancelled)
-    {
-      cancel();
-      return;
-    }
     // 2. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
     //    since a cycle in float is not quite linear
     double rzNew = 0.;
@@ -1751,11 +1748,6 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       rp = rz;
       report.fineApplications += 1.;
     }
-    if (cancelled)
-    {
-      cancel();
-      return;
-    }
     if (!std::isfinite(pAp) || !(pAp > 0.))
     {
       finish(std::isfinite(pAp) ? StopReason::Breakdown : StopReason::NotFinite);
@@ -1770,13 +1762,14 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     // 5. phi += alpha p, r -= alpha A p; not interrupted: phi stays a whole
     rNorm = rScale *
-      std::sqrt(SumEachRow(op, this->parallelFor,
+      std::sqrt(SumEachRow(op, this->parallelFor.whole(),
         [&](std::int64_t, std::int64_t o, int n)
         {
           return update(n, alpha * rScale, static_cast<float>(alpha), p.data() + o, Ap.data() + o,
             phi + o, r.data() + o);
         }));
     ++report.iterations;
+    report.residual = rNorm / bNorm;
 
     // 6. trust only the recomputed residual, and refresh float's before its rounding shows
     if (!std::isfinite(rNorm))
@@ -1824,16 +1817,17 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     const double done =
       std::log(rStart / std::max(rNorm, goal)) / std::log(std::max(rStart / goal, 1. + 1e-9));
-    fraction = progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
+    const double fraction =
+      progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
+    this->parallelFor.tell(fraction);
     if (control.intermediate && now() - seen >= control.intermediateInterval)
     {
       control.intermediate(phi);
       seen = now();
     }
-    if (!goOn())
+    if (control.progress && !control.progress(fraction))
     {
-      cancel();
-      return;
+      throw Interrupted();
     }
   }
 }
@@ -1846,7 +1840,8 @@ void DiffusionSolver::solveConstant(
   const double bNorm = this->norm(b);
   if (bNorm == 0.)
   {
-    std::fill(phi, phi + size, 0.);
+    ForRows(this->parallelFor.whole(), size, size,
+      [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
     report.residual = 0.;
     report.reason = StopReason::Converged;
     return;
@@ -1904,17 +1899,22 @@ void DiffusionSolver::solveConstant(
         return 0.;
       });
     // 2. x = A^-1 x
-    if (!this->constant.solve(x.data(), this->parallelFor,
-          [&](double done) { return !control.progress || control.progress(done); }))
-    {
-      report.reason = StopReason::Cancelled;
-      report.message = "cancelled; the field is the one before";
-      return;
-    }
+    this->constant.solve(x.data(), this->parallelFor,
+      [&](double done)
+      {
+        this->parallelFor.tell(done);
+        if (control.progress && !control.progress(done))
+        {
+          throw Interrupted();
+        }
+        return true;
+      });
     if (report.iterations > 0 && estimate)
     {
       Buffer<float> z(size);
-      std::copy(x.data(), x.data() + size, z.data());
+      ForRows(this->parallelFor, size, size,
+        [&](std::int64_t begin, std::int64_t end)
+        { std::copy(x.data() + begin, x.data() + end, z.data() + begin); });
       this->estimateError(phi, z.data(), 1., 1., report);
       if (rNorm <= goal)
       {
@@ -1923,9 +1923,10 @@ void DiffusionSolver::solveConstant(
       }
     }
     // 3. phi += x, where that is better
+    Touch(phi, size, this->parallelFor);
     const auto add = [&](double sign)
     {
-      ForEachRow(this->A, this->parallelFor,
+      ForEachRow(this->A, this->parallelFor.whole(),
         [&](std::int64_t, std::int64_t o, int n)
         {
           for (std::int64_t i = o; i < o + n; ++i)
@@ -1966,23 +1967,26 @@ void DiffusionSolver::solveConstant(
   }
 }
 
+template <class Term>
+double DiffusionSolver::sumOf(const Term& term) const
+{
+  return SumEachRow(this->A, this->parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
+    {
+      double s = 0.;
+      for (std::int64_t i = o; i < o + n; ++i)
+      {
+        s += term(i);
+      }
+      return s;
+    });
+}
+
 template <class T>
 void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& report) const
 {
   const double V = this->box.voxelVolume();
-  const auto sum = [&](auto&& term)
-  {
-    return SumEachRow(this->A, this->parallelFor,
-      [&](std::int64_t, std::int64_t o, int n)
-      {
-        double s = 0.;
-        for (std::int64_t i = o; i < o + n; ++i)
-        {
-          s += term(i);
-        }
-        return s;
-      });
-  };
+  const auto sum = [this](const auto& term) { return this->sumOf(term); };
   // an active region holds all sources
   report.emitted = !q ? 0. : V * sum([&](std::int64_t i) { return static_cast<double>(q[i]); });
   // from the medium itself, as the residual
@@ -2056,13 +2060,9 @@ bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, std::vector<
   constexpr double balanced = 1e-6; // float sources
   if (!this->anyWall)
   {
-    double sum = 0.;
-    double magnitude = 0.;
-    for (std::int64_t i = 0; i < size; ++i)
-    {
-      sum += static_cast<double>(q[i]);
-      magnitude += std::abs(static_cast<double>(q[i]));
-    }
+    const double sum = this->sumOf([q](std::int64_t i) { return static_cast<double>(q[i]); });
+    const double magnitude =
+      this->sumOf([q](std::int64_t i) { return std::abs(static_cast<double>(q[i])); });
     const double V = this->box.voxelVolume();
     singular = true;
     return std::abs(sum) <= balanced * magnitude || refuse(sum * V, magnitude * V, "here");
@@ -2072,6 +2072,14 @@ bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, std::vector<
   const std::int64_t stride[3] = { 1, n[0], static_cast<std::int64_t>(n[0]) * n[1] };
   seen.assign(static_cast<std::size_t>(size), 0);
   std::vector<std::int64_t> front;
+  std::int64_t visited = 0;
+  const auto visits = [&]
+  {
+    if (++visited % 65536 == 0)
+    {
+      this->parallelFor.poll();
+    }
+  };
   const auto flood = [&](std::int64_t seed, std::uint8_t mark, const auto& action)
   {
     seen[static_cast<std::size_t>(seed)] = mark;
@@ -2080,6 +2088,7 @@ bool DiffusionSolver::steadyStateExists(const T* q, bool& singular, std::vector<
     {
       const std::int64_t i = front.back();
       front.pop_back();
+      visits();
       action(i);
       const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>((i / n[0]) % n[1]),
         static_cast<int>(i / stride[2]) };
@@ -2225,8 +2234,19 @@ template <class T>
 DiffusionReport DiffusionSolver::solveSteady(
   const T* q, double* phi, const DiffusionControl& control)
 {
-  DiffusionReport report;
-  const double began = now();
+  return this->interruptible(control.progress,
+    [&](DiffusionReport& report)
+    {
+      report.residual = -1.;
+      this->steady(q, phi, control, report);
+    });
+}
+
+template <class T>
+void DiffusionSolver::steady(
+  const T* q, double* phi, const DiffusionControl& control, DiffusionReport& report)
+{
+  this->parallelFor.tell(0.);
   this->setShift(0.);
   bool singular = false;
   std::vector<std::uint8_t> reached;
@@ -2237,10 +2257,15 @@ DiffusionReport DiffusionSolver::solveSteady(
     const std::int64_t size = this->box.size();
     const auto darken = [&]
     {
-      for (std::size_t i = 0; i < reached.size(); ++i)
-      {
-        phi[i] = reached[i] ? phi[i] : 0.;
-      }
+      const std::int64_t flags = static_cast<std::int64_t>(reached.size());
+      ForRows(this->parallelFor.whole(), flags, flags,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          for (std::int64_t i = begin; i < end; ++i)
+          {
+            phi[i] = reached[static_cast<std::size_t>(i)] ? phi[i] : 0.;
+          }
+        });
     };
     darken(); // a start from elsewhere
     if (const std::uint8_t* outside = this->outsideOfDomain())
@@ -2257,12 +2282,8 @@ DiffusionReport DiffusionSolver::solveSteady(
     RightHandSide<T> b{ q, 1. / this->scale, false };
     if (singular)
     {
-      double sum = 0.;
-      for (std::int64_t i = 0; i < size; ++i)
-      {
-        sum += static_cast<double>(q[i]);
-      }
-      b.mean = b.qScale * sum / static_cast<double>(size);
+      b.mean = b.qScale * this->sumOf([q](std::int64_t i) { return static_cast<double>(q[i]); }) /
+        static_cast<double>(size);
     }
     if (this->isConstant)
     {
@@ -2271,15 +2292,27 @@ DiffusionReport DiffusionSolver::solveSteady(
     else
     {
       const auto grounded = this->ground(singular, closed);
-      this->conjugateGradients(b, phi, control, 0., 1., report);
-      for (const auto& voxel : grounded)
+      const auto restore = [&]
       {
-        if (this->A.isStored())
+        for (const auto& voxel : grounded)
         {
-          this->A.s[voxel.first] = voxel.second;
+          if (this->A.isStored())
+          {
+            this->A.s[voxel.first] = voxel.second;
+          }
+          this->multigridReady = false;
         }
-        this->multigridReady = false;
+      };
+      try
+      {
+        this->conjugateGradients(b, phi, control, 0., 1., report);
       }
+      catch (const Interrupted&)
+      {
+        restore();
+        throw;
+      }
+      restore();
     }
     this->keepSign(b, phi, control, report);
     for (const ClosedPart& part : closed)
@@ -2297,24 +2330,19 @@ DiffusionReport DiffusionSolver::solveSteady(
     darken(); // a closed part without sink may hold any constant: it holds none
     if (singular)
     {
-      double sum = 0.;
-      for (std::int64_t i = 0; i < size; ++i)
-      {
-        sum += phi[i];
-      }
-      const double mean = sum / static_cast<double>(size);
-      for (std::int64_t i = 0; i < size; ++i)
-      {
-        phi[i] -= mean;
-      }
+      const double mean =
+        this->sumOf([phi](std::int64_t i) { return phi[i]; }) / static_cast<double>(size);
+      ForRows(this->parallelFor.whole(), size, size,
+        [&](std::int64_t begin, std::int64_t end)
+        {
+          for (std::int64_t i = begin; i < end; ++i)
+          {
+            phi[i] -= mean;
+          }
+        });
     }
-    if (report.reason != StopReason::Cancelled) // at once
-    {
-      this->balance(q, phi, report);
-    }
+    this->balance(q, phi, report);
   }
-  report.seconds = now() - began;
-  return report;
 }
 
 //------------------------------------------------------------------------------
@@ -2422,9 +2450,9 @@ DiffusionMedium<T> DiffusionSolver::cut(const DiffusionMedium<T>& medium, std::v
 }
 
 template <class Action>
-void DiffusionSolver::forRegion(const Action& action) const
+void DiffusionSolver::forRegion(const ParallelFor& loop, const Action& action) const
 {
-  ForEachRow(this->A, this->parallelFor,
+  ForEachRow(this->A, loop,
     [&](std::int64_t row, std::int64_t o, int n)
     {
       const std::array<int, 3>& m = this->box.dims;
@@ -2439,6 +2467,19 @@ template <class T, class Q>
 DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, const Q* q,
   double* phi, const DiffusionControl& control, double threshold)
 {
+  return this->interruptible(control.progress,
+    [&](DiffusionReport& report)
+    {
+      report.residual = -1.;
+      this->parallelFor.tell(0.);
+      report = this->active(medium, q, phi, control, threshold);
+    });
+}
+
+template <class T, class Q>
+DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const Q* q, double* phi,
+  const DiffusionControl& control, double threshold)
+{
   const double began = now();
   DiffusionReport report = this->check(medium);
   if (report.reason != StopReason::Converged)
@@ -2447,8 +2488,13 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
   }
   const std::int64_t size = this->volume.size();
   // A field to start from is none of this solve's.
-  ForRows(this->parallelFor, size, size,
-    [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
+  const auto darken = [&]
+  {
+    ForRows(this->parallelFor.whole(), size, size,
+      [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
+  };
+  Touch(phi, size, this->parallelFor);
+  darken();
   if (this->isConstant)
   {
     this->describe(medium); // solved at once: no part of it costs less
@@ -2488,7 +2534,7 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
   {
     if (control.regionOrNothing && !asked)
     {
-      std::fill(phi, phi + size, 0.);
+      darken();
       report.reason = StopReason::MaxIterations;
       report.message = "light fills the volume";
       return finish(1.);
@@ -2540,7 +2586,7 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
       this->assemble(part, std::move(spans));
       source.allocate(this->box.size(), Pages::Small);
       field.allocate(this->box.size(), Pages::Small);
-      this->forRegion(
+      this->forRegion(this->parallelFor,
         [&](std::int64_t from, std::int64_t to, int n)
         {
           std::copy(q + from, q + from + n, source.data() + to);
@@ -2561,7 +2607,8 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
     }
     const auto publish = [&](const double* reached)
     {
-      this->forRegion([&](std::int64_t to, std::int64_t from, int n)
+      this->forRegion(this->parallelFor.whole(),
+        [&](std::int64_t to, std::int64_t from, int n)
         { std::copy(reached + from, reached + from + n, phi + to); });
     };
     const bool late = control.timeBudget > 0. && now() - began > 0.5 * control.timeBudget;
@@ -2588,7 +2635,7 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
     if (report.reason == StopReason::NoSteadyState || report.reason == StopReason::NotFinite ||
       report.reason == StopReason::Diverged)
     {
-      std::fill(phi, phi + size, 0.);
+      darken();
       return wholeVolume(); // it tells why, or does without the coarse grids of a region
     }
     publish(field.data());
@@ -2635,8 +2682,16 @@ template <class T>
 DiffusionReport DiffusionSolver::stepImplicit(
   const T* q, double* phi, int steps, double cdt, const DiffusionControl& control)
 {
-  DiffusionReport report;
-  const double began = now();
+  DiffusionReport report = this->interruptible(control.progress,
+    [&](DiffusionReport& inner) { this->implicit(q, phi, steps, cdt, control, inner); });
+  this->setShift(0.);
+  return report;
+}
+
+template <class T>
+void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
+  const DiffusionControl& control, DiffusionReport& report)
+{
   const std::int64_t size = this->box.size();
   // SDIRK2 is two backward Euler steps of length gamma c dt, the second from where the slope of
   // the first leads.
@@ -2646,12 +2701,13 @@ DiffusionReport DiffusionSolver::stepImplicit(
   if (!std::isfinite(cdt) || !(cdt > 0.) || !std::isfinite(shifted) || shifted > 1e30)
   {
     report.message = "the time step c dt is not a positive length";
-    return report;
+    return;
   }
   if (!this->startsInside(q, report))
   {
-    return report;
+    return;
   }
+  report.residual = -1.;
   const RightHandSide<T> steady{ q, 1. / this->scale, true };
   const double qNorm = this->norm(steady);
   this->setShift(shifted);
@@ -2662,23 +2718,36 @@ DiffusionReport DiffusionSolver::stepImplicit(
   sharper.targetError = sharper.timeBudget = 0.; // of a steady answer, not of a step
   for (std::int64_t solve = 0; solve < solves; ++solve)
   {
-    if (solve % stages == 0)
-    {
-      std::copy(phi, phi + size, previous.data());
-    }
-    else
-    {
-      const double ahead = (1. - gamma) / gamma;
-      for (std::int64_t i = 0; i < size; ++i)
+    const double ahead = solve % stages == 0 ? 1. : (1. - gamma) / gamma;
+    ForRows(this->parallelFor, size, size,
+      [&](std::int64_t begin, std::int64_t end)
       {
-        previous[i] += ahead * (phi[i] - previous[i]);
-      }
-    }
+        for (std::int64_t i = begin; i < end; ++i)
+        {
+          previous[i] = ahead == 1. ? phi[i] : previous[i] + ahead * (phi[i] - previous[i]);
+        }
+      });
     const RightHandSide<T> b{ q, 1. / this->scale, true, 0., previous.data(), this->A.s.data(),
       this->sinkWithoutShift.data() };
     const double part = 1. / static_cast<double>(solves);
-    this->conjugateGradients(b, phi, sharper, static_cast<double>(solve) * part,
-      static_cast<double>(solve + 1) * part, report);
+    try
+    {
+      this->conjugateGradients(b, phi, sharper, static_cast<double>(solve) * part,
+        static_cast<double>(solve + 1) * part, report);
+    }
+    catch (const Interrupted&)
+    {
+      report.residual = -1.;
+      report.message = "cancelled amid a step; the field is between two";
+      if (solve % stages == 0)
+      {
+        ForRows(this->parallelFor.whole(), size, size,
+          [&](std::int64_t begin, std::int64_t end)
+          { std::copy(previous.data() + begin, previous.data() + end, phi + begin); });
+        report.message = "cancelled amid a step; the field is that before it";
+      }
+      throw;
+    }
     if (report.reason != StopReason::Converged)
     {
       if (report.reason == StopReason::MaxIterations) // else the reason of steps that are all made
@@ -2729,8 +2798,6 @@ DiffusionReport DiffusionSolver::stepImplicit(
   const double last = this->residual<T>(steady, phi, nullptr, 1.);
   report.residual = qNorm > 0. ? last / qNorm : last;
   this->balance(q, phi, report);
-  report.seconds = now() - began;
-  return report;
 }
 
 //------------------------------------------------------------------------------
@@ -2816,193 +2883,200 @@ void DiffusionSolver::keepSign(
 }
 
 //------------------------------------------------------------------------------
+std::string DiffusionSolver::badStep(double cdt) const
+{
+  // The margin is rounding's: the bound itself is allowed.
+  if (std::isfinite(cdt) && cdt > 0. && cdt <= this->stabilityBound() * (1. + 1e-6))
+  {
+    return {};
+  }
+  std::ostringstream text;
+  text << "the explicit step c dt = " << cdt << " is unstable; expected in (0, "
+       << this->stabilityBound() << "] (length; positive fields stay positive up to "
+       << this->positivityBound() << ")";
+  return text.str();
+}
+
 template <class T>
 DiffusionReport DiffusionSolver::stepExplicit(
   const T* q, double* phi, int steps, double cdt, const DiffusionControl& control)
 {
-  // The margin is rounding's: the bound itself is allowed.
-  if (!std::isfinite(cdt) || !(cdt > 0.) || cdt > this->stabilityBound() * (1. + 1e-6))
-  {
-    DiffusionReport report;
-    std::ostringstream text;
-    text << "the explicit step c dt = " << cdt << " is unstable; expected in (0, "
-         << this->stabilityBound() << "] (length; positive fields stay positive up to "
-         << this->positivityBound() << ")";
-    report.message = text.str();
-    return report;
-  }
-  return this->march(q, phi, steps, cdt, false, control);
+  return this->march(q, phi, nullptr, steps, cdt, false, control);
+}
+
+template <class T>
+DiffusionReport DiffusionSolver::stepExplicit(
+  const T* q, Buffer<double>& phi, int steps, double cdt, const DiffusionControl& control)
+{
+  return this->march(q, phi.data(), &phi, steps, cdt, false, control);
 }
 
 template <class T>
 DiffusionReport DiffusionSolver::stepLocal(
   const T* q, double* phi, int steps, double courant, const DiffusionControl& control)
 {
-  DiffusionReport report;
-  if (!(courant > 0. && courant <= 1.))
-  {
-    std::ostringstream text;
-    text << "the fraction of the local step is " << courant << "; expected in (0, 1]";
-    report.message = text.str();
-    return report;
-  }
-  bool singular = false;
-  std::vector<std::uint8_t> reached;
-  std::vector<ClosedPart> closed;
-  if (q && !this->steadyStateExists(q, singular, reached, closed, report))
-  {
-    return report;
-  }
-  return this->march(q, phi, steps, courant, true, control);
+  return this->march(q, phi, nullptr, steps, courant, true, control);
 }
 
 template <class T>
-DiffusionReport DiffusionSolver::march(
-  const T* q, double* phi, int steps, double length, bool local, const DiffusionControl& control)
+DiffusionReport DiffusionSolver::stepLocal(
+  const T* q, Buffer<double>& phi, int steps, double courant, const DiffusionControl& control)
 {
-  DiffusionReport report;
-  const double began = now();
-  const std::int64_t size = this->box.size();
-  const int nx = this->box.dims[0];
-  if (!this->startsInside(q, report))
-  {
-    return report;
-  }
-  this->storeFaces();
-  this->setShift(0.);
-  const RightHandSide<T> b{ q, 1. / this->scale, true };
-  const double qNorm = this->norm(b);
-  Buffer<double> other(size);
-  report.bytes =
-    this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
-  double* fields[2] = { phi, other.data() };
+  return this->march(q, phi.data(), &phi, steps, courant, true, control);
+}
+
+template <class T>
+DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* store, int steps,
+  double length, bool local, const DiffusionControl& control)
+{
+  Buffer<double> other;
+  double* fields[2] = { phi, nullptr };
   int at = 0; // the field that phi's last state is in
-  const double step = local ? length : length * this->scale;
-  double seen = began;
-  // What does not fit the cache goes several steps in one pass over the memory. Nobody is asked
-  // between these; where somebody is there to be asked they must not last.
-  const bool several = size >= SeveralStepsFrom && (!control.progress || size <= AskedInTimeUpTo);
-  const std::size_t rowCount = static_cast<std::size_t>(this->rows());
-  std::vector<double> squares(StepsInOnePass * rowCount);
-  double asked = began;
-  double rNorm = -1.; // of what the last step began with
-  const auto goOn = [&]
+  const auto keep = [&]
   {
-    asked = now();
-    return !control.progress ||
-      control.progress(static_cast<double>(report.iterations) / static_cast<double>(steps));
+    if (at == 1 && store)
+    {
+      std::swap(*store, other);
+    }
+    else if (at == 1)
+    {
+      ForRows(this->parallelFor.whole(), this->box.size(), this->box.size(),
+        [&](std::int64_t begin, std::int64_t end)
+        { std::copy(fields[1] + begin, fields[1] + end, phi + begin); });
+    }
+    at = 0;
   };
-  report.reason = StopReason::MaxIterations;
-  while (report.iterations < steps)
-  {
-    const int stages = several ? std::min(StepsInOnePass, steps - report.iterations) : 1;
-    const auto advance = [&](int stage, std::int64_t r)
+  DiffusionReport all = this->interruptible(control.progress,
+    [&](DiffusionReport& report)
     {
-      const double* from = fields[(at + stage) % 2];
-      double* to = fields[(at + stage + 1) % 2];
-      DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
-      static thread_local std::vector<double> store;
-      store.resize(2 * static_cast<std::size_t>(nx) + 2);
-      if (r == 0 || r + 1 == this->rows())
+      if (local && !(length > 0. && length <= 1.))
       {
-        // the kernel reads one value more on either side than the caller has
-        double* own = store.data() + nx + 1;
-        std::copy(row.x, row.x + nx, own);
-        own[-1] = own[nx] = 0.;
-        row.x = own;
+        std::ostringstream text;
+        text << "the fraction of the local step is " << length << "; expected in (0, 1]";
+        report.message = text.str();
+        return;
       }
-      if (local)
+      report.message = local ? std::string() : this->badStep(length);
+      bool singular = false;
+      std::vector<std::uint8_t> reached;
+      std::vector<ClosedPart> closed;
+      if (!report.message.empty() || !this->startsInside(q, report) ||
+        (local && q && !this->steadyStateExists(q, singular, reached, closed, report)))
       {
-        localSteps(row, step, store.data());
+        return;
       }
-      squares[static_cast<std::size_t>(stage) * rowCount + static_cast<std::size_t>(r)] =
-        explicitRow(row, q ? q + r * nx : nullptr, b.qScale, b.mean, step,
-          local ? store.data() : nullptr, to + r * nx);
-    };
-    if (stages == 1)
-    {
-      // In pieces of some milliseconds: who cancels does not wait for the step, which is dropped.
-      const std::int64_t piece = std::max<std::int64_t>(64, (std::int64_t(1) << 20) / nx);
-      for (std::int64_t first = 0; first < this->rows(); first += piece)
+      report.residual = -1.;
+      this->parallelFor.tell(0.);
+      const std::int64_t size = this->box.size();
+      const int nx = this->box.dims[0];
+      this->storeFaces();
+      this->setShift(0.);
+      const RightHandSide<T> b{ q, 1. / this->scale, true };
+      const double qNorm = this->norm(b);
+      other.allocate(size);
+      fields[1] = other.data();
+      Touch(phi, size, this->parallelFor);
+      Touch(other.data(), size, this->parallelFor);
+      report.bytes =
+        this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
+      const double step = local ? length : length * this->scale;
+      double seen = now();
+      // What does not fit the cache goes several steps in one pass over the memory. Nobody is asked
+      // between these; where somebody is there to be asked they must not last.
+      const bool several =
+        size >= SeveralStepsFrom && (!control.progress || size <= AskedInTimeUpTo);
+      const std::size_t rowCount = static_cast<std::size_t>(this->rows());
+      std::vector<double> squares(StepsInOnePass * rowCount);
+      report.reason = StopReason::MaxIterations;
+      while (report.iterations < steps)
       {
-        if (first > 0 && now() - asked > 0.02 && !goOn())
+        const int stages = several ? std::min(StepsInOnePass, steps - report.iterations) : 1;
+        const auto advance = [&](int stage, std::int64_t r)
         {
-          report.reason = StopReason::Cancelled;
+          const double* from = fields[(at + stage) % 2];
+          double* to = fields[(at + stage + 1) % 2];
+          DoubleRow row = doubleRow(this->A, from, r, r * nx, nx);
+          static thread_local std::vector<double> room;
+          room.resize(2 * static_cast<std::size_t>(nx) + 2);
+          if (r == 0 || r + 1 == this->rows())
+          {
+            // the kernel reads one value more on either side than the caller has
+            double* own = room.data() + nx + 1;
+            std::copy(row.x, row.x + nx, own);
+            own[-1] = own[nx] = 0.;
+            row.x = own;
+          }
+          if (local)
+          {
+            localSteps(row, step, room.data());
+          }
+          squares[static_cast<std::size_t>(stage) * rowCount + static_cast<std::size_t>(r)] =
+            explicitRow(row, q ? q + r * nx : nullptr, b.qScale, b.mean, step,
+              local ? room.data() : nullptr, to + r * nx);
+        };
+        if (stages == 1)
+        {
+          // Who cancels does not wait for the step, which is dropped.
+          ForRows(this->parallelFor, this->rows(), size,
+            [&](std::int64_t begin, std::int64_t end)
+            {
+              for (std::int64_t r = begin; r < end; ++r)
+              {
+                advance(0, r);
+              }
+            });
+        }
+        else
+        {
+          ForEachStage(this->A, stages, this->parallelFor.whole(), advance);
+        }
+        at = (at + stages) % 2;
+        report.iterations += stages;
+        report.fineApplications += stages;
+        double sum = 0.;
+        for (std::size_t r = 0; r < rowCount; ++r)
+        {
+          sum += squares[static_cast<std::size_t>(stages - 1) * rowCount + r];
+        }
+        const double rNorm = std::sqrt(sum); // of what the last step began with
+        report.residual = qNorm > 0. ? rNorm / qNorm : rNorm;
+        if (!std::isfinite(rNorm))
+        {
+          report.reason = StopReason::NotFinite;
           break;
         }
-        const std::int64_t count = std::min(piece, this->rows() - first);
-        ForRows(this->parallelFor, count, count * nx,
-          [&](std::int64_t begin, std::int64_t end)
-          {
-            for (std::int64_t r = first + begin; r < first + end; ++r)
-            {
-              advance(0, r);
-            }
-          });
+        if (qNorm > 0. && rNorm <= control.tolerance * qNorm)
+        {
+          report.reason = StopReason::Converged;
+          break;
+        }
+        if (control.intermediate && now() - seen >= control.intermediateInterval)
+        {
+          control.intermediate(fields[at]);
+          seen = now();
+        }
+        const double fraction = static_cast<double>(report.iterations) / static_cast<double>(steps);
+        this->parallelFor.tell(fraction);
+        if (control.progress && !control.progress(fraction))
+        {
+          throw Interrupted();
+        }
       }
-      if (report.reason == StopReason::Cancelled)
-      {
-        break;
-      }
-    }
-    else
-    {
-      ForEachStage(this->A, stages, this->parallelFor, advance);
-    }
-    at = (at + stages) % 2;
-    report.iterations += stages;
-    report.fineApplications += stages;
-    double sum = 0.;
-    for (std::size_t r = 0; r < rowCount; ++r)
-    {
-      sum += squares[static_cast<std::size_t>(stages - 1) * rowCount + r];
-    }
-    rNorm = std::sqrt(sum);
-    if (!std::isfinite(rNorm))
-    {
-      report.reason = StopReason::NotFinite;
-      break;
-    }
-    if (qNorm > 0. && rNorm <= control.tolerance * qNorm)
-    {
-      report.reason = StopReason::Converged;
-      break;
-    }
-    if (control.intermediate && now() - seen >= control.intermediateInterval)
-    {
-      control.intermediate(fields[at]);
-      seen = now();
-    }
-    if (!goOn())
-    {
-      report.reason = StopReason::Cancelled;
-      break;
-    }
-  }
-  const double* from = fields[at];
-  if (from != phi)
-  {
-    ForRows(this->parallelFor, size, size,
-      [&](std::int64_t begin, std::int64_t end)
-      { std::copy(from + begin, from + end, phi + begin); });
-  }
-  if (report.reason == StopReason::Cancelled && rNorm >= 0. && qNorm > 0.)
-  {
-    report.residual = rNorm / qNorm; // at once: powers are not told
-    report.seconds = now() - began;
-    return report;
-  }
-  const double last = this->residual<T>(b, phi, nullptr, 1.);
-  report.residual = qNorm > 0. ? last / qNorm : last;
-  this->balance(q, phi, report);
-  report.seconds = now() - began;
-  return report;
+      keep();
+      phi = store ? store->data() : phi;
+      const double last = this->residual<T>(b, phi, nullptr, 1.);
+      report.residual = qNorm > 0. ? last / qNorm : last;
+      this->balance(q, phi, report);
+    });
+  keep(); // where it was cancelled
+  return all;
 }
 
 //------------------------------------------------------------------------------
 template <class T>
-void DiffusionSolver::flux(const double* phi, T* E) const
+bool DiffusionSolver::flux(const double* phi, T* E, const DiffusionProgress& progress) const
 {
+  const WatchedFor::Asking asking(this->parallelFor, progress);
   const std::array<int, 3>& m = this->volume.dims;
   const std::int64_t stride[3] = { 1, m[0], static_cast<std::int64_t>(m[0]) * m[1] };
   const std::array<int, 3>& n = this->box.dims;
@@ -3012,50 +3086,63 @@ void DiffusionSolver::flux(const double* phi, T* E) const
   {
     std::fill(E, E + 3 * this->volume.size(), T(0));
   }
-  this->forRegion(
-    [&](std::int64_t to, std::int64_t o, int length)
-    {
-      const std::int64_t row = o / n[0];
-      int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
-      for (int x = 0; x < length; ++x)
+  const auto write = [&]
+  {
+    this->forRegion(this->parallelFor,
+      [&](std::int64_t to, std::int64_t o, int length)
       {
-        // the voxel in the box and in the volume
-        const std::int64_t b = o + x;
-        const std::int64_t i = to + x;
-        at[0] = static_cast<int>(b % n[0]);
-        for (int d = 0; d < 3; ++d)
+        const std::int64_t row = o / n[0];
+        int at[3] = { 0, static_cast<int>(row % n[1]), static_cast<int>(row / n[1]) };
+        for (int x = 0; x < length; ++x)
         {
-          double low = 0.;
-          double high = 0.;
-          if (at[d] > 0)
+          // the voxel in the box and in the volume
+          const std::int64_t b = o + x;
+          const std::int64_t i = to + x;
+          at[0] = static_cast<int>(b % n[0]);
+          for (int d = 0; d < 3; ++d)
           {
-            low = this->face(d, b - step[d]) * (phi[i - stride[d]] - phi[i]);
+            double low = 0.;
+            double high = 0.;
+            if (at[d] > 0)
+            {
+              low = this->face(d, b - step[d]) * (phi[i - stride[d]] - phi[i]);
+            }
+            else if (!this->border[d][0].empty())
+            {
+              low = -static_cast<double>(
+                      this->border[d][0][static_cast<std::size_t>(this->borderIndex(d, at))]) *
+                phi[i];
+            }
+            if (at[d] + 1 < n[d])
+            {
+              high = this->face(d, b) * (phi[i] - phi[i + stride[d]]);
+            }
+            else if (!this->border[d][1].empty())
+            {
+              high = static_cast<double>(
+                       this->border[d][1][static_cast<std::size_t>(this->borderIndex(d, at))]) *
+                phi[i];
+            }
+            E[3 * i + d] = static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
           }
-          else if (!this->border[d][0].empty())
-          {
-            low = -static_cast<double>(
-                    this->border[d][0][static_cast<std::size_t>(this->borderIndex(d, at))]) *
-              phi[i];
-          }
-          if (at[d] + 1 < n[d])
-          {
-            high = this->face(d, b) * (phi[i] - phi[i + stride[d]]);
-          }
-          else if (!this->border[d][1].empty())
-          {
-            high = static_cast<double>(
-                     this->border[d][1][static_cast<std::size_t>(this->borderIndex(d, at))]) *
-              phi[i];
-          }
-          E[3 * i + d] = static_cast<T>(0.5 * (low + high) * this->box.spacing[d] * this->scale);
         }
-      }
-    });
+      });
+  };
+  try
+  {
+    write();
+  }
+  catch (const Interrupted&)
+  {
+    return false;
+  }
+  return true;
 }
 
 //------------------------------------------------------------------------------
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
-  template DiffusionReport DiffusionSolver::setMedium<T>(const DiffusionMedium<T>&);               \
+  template DiffusionReport DiffusionSolver::setMedium<T>(                                          \
+    const DiffusionMedium<T>&, const DiffusionProgress&);                                          \
   template DiffusionReport DiffusionSolver::solveActive<T, float>(                                 \
     const DiffusionMedium<T>&, const float*, double*, const DiffusionControl&, double);            \
   template DiffusionReport DiffusionSolver::solveActive<T, double>(                                \
@@ -3066,9 +3153,13 @@ void DiffusionSolver::flux(const double* phi, T* E) const
     const T*, double*, int, double, const DiffusionControl&);                                      \
   template DiffusionReport DiffusionSolver::stepLocal<T>(                                          \
     const T*, double*, int, double, const DiffusionControl&);                                      \
+  template DiffusionReport DiffusionSolver::stepExplicit<T>(                                       \
+    const T*, Buffer<double>&, int, double, const DiffusionControl&);                              \
+  template DiffusionReport DiffusionSolver::stepLocal<T>(                                          \
+    const T*, Buffer<double>&, int, double, const DiffusionControl&);                              \
   template DiffusionReport DiffusionSolver::stepImplicit<T>(                                       \
     const T*, double*, int, double, const DiffusionControl&);                                      \
-  template void DiffusionSolver::flux<T>(const double*, T*) const;
+  template bool DiffusionSolver::flux<T>(const double*, T*, const DiffusionProgress&) const;
 LIGHTTRANSPORT_INSTANTIATE(float)
 LIGHTTRANSPORT_INSTANTIATE(double)
 #undef LIGHTTRANSPORT_INSTANTIATE

@@ -22,6 +22,7 @@
 #include "Core/Grid.h"
 #include "Core/Multigrid.h"
 #include "Core/Parallel.h"
+#include "Core/Watched.h"
 
 #include <array>
 #include <cstdint>
@@ -93,7 +94,8 @@ struct DiffusionReport
   int iterations = 0;
   /**
    * |b - A phi| / |b|, recomputed in double from phi and the medium; in time: of the steady
-   * equation with the float faces that the steps use.
+   * equation with the float faces that the steps use. After Cancelled that of the last iteration
+   * or step, not recomputed; negative where there was none.
    */
   double residual = 0.;
   double seconds = 0.;    ///< this call, the set-up that it needed included
@@ -122,7 +124,7 @@ struct DiffusionControl
   double tolerance = 1e-8;
   int maxIterations = 500;
   ImplicitScheme implicitScheme = ImplicitScheme::BackwardEuler;
-  DiffusionProgress progress; ///< may be empty; also called every 20 ms while a pass runs
+  DiffusionProgress progress; ///< may be empty; also called every 10 ms while passes run
   /**
    * Where above 0, the solve ends with Converged as soon as the estimated error (see
    * DiffusionReport) is at or below half of it, or the tolerance is met.
@@ -160,10 +162,12 @@ public:
    * Keeps the medium's operator, with float coefficients (16 bytes per voxel; none before the
    * first time step, where D and sigma_a are constant), and looks at the arrays again to recompute
    * steady residuals: they must outlive the solves. Answers
-   * BadInput, and says where, for a D or sigma_a that is negative or not finite.
+   * BadInput, and says where, for a D or sigma_a that is negative or not finite; Cancelled where
+   * `progress` says so: then there is no operator.
    */
   template <class T>
-  DiffusionReport setMedium(const DiffusionMedium<T>& medium);
+  DiffusionReport setMedium(
+    const DiffusionMedium<T>& medium, const DiffusionProgress& progress = {});
 
   /**
    * Steady state: conjugate gradients, preconditioned by one multigrid cycle,
@@ -203,6 +207,10 @@ public:
   template <class T>
   DiffusionReport stepImplicit(
     const T* q, double* phi, int steps, double cdt, const DiffusionControl& control);
+  /** stepExplicit and stepLocal in a buffer, which may become another: that spares a copy. */
+  template <class T>
+  DiffusionReport stepExplicit(
+    const T* q, Buffer<double>& phi, int steps, double cdt, const DiffusionControl& control);
 
   /**
    * Explicit steps in which every voxel has its own c dt: the fraction `courant`, in (0, 1], of
@@ -213,20 +221,38 @@ public:
   template <class T>
   DiffusionReport stepLocal(
     const T* q, double* phi, int steps, double courant, const DiffusionControl& control);
+  template <class T>
+  DiffusionReport stepLocal(
+    const T* q, Buffer<double>& phi, int steps, double courant, const DiffusionControl& control);
 
   /** c dt up to which a forward Euler step keeps positive fields positive: 1 / max diagonal. */
   double positivityBound() const;
   /** c dt up to which it is stable: 2 / (Gershgorin's bound of the largest eigenvalue). */
   double stabilityBound() const;
 
-  /** E = -D grad phi at voxel centres, along the grid's axes; E has 3 values per voxel. */
+  /**
+   * E = -D grad phi at voxel centres, along the grid's axes; E has 3 values per voxel. False where
+   * `progress` ended it.
+   */
   template <class T>
-  void flux(const double* phi, T* E) const;
+  bool flux(const double* phi, T* E, const DiffusionProgress& progress = {}) const;
 
   const Grid& grid() const { return this->volume; }
 
 private:
   friend class CoarseDiffusion;
+  friend class FirstMomentSolver;
+  /** solve(report), its loops watched; Cancelled where they were interrupted. */
+  template <class Solve>
+  DiffusionReport interruptible(const DiffusionProgress& progress, const Solve& solve);
+  template <class T>
+  void steady(const T* q, double* phi, const DiffusionControl& control, DiffusionReport& report);
+  template <class T, class Q>
+  DiffusionReport active(const DiffusionMedium<T>& medium, const Q* q, double* phi,
+    const DiffusionControl& control, double threshold);
+  template <class T>
+  void implicit(const T* q, double* phi, int steps, double cdt, const DiffusionControl& control,
+    DiffusionReport& report);
   /** Takes an operator made elsewhere, divided by operatorScale, for steady solves alone. */
   void setOperator(const Grid& grid, DiffusionOperator&& op, double operatorScale);
   /** Checks the medium and sets the scale. */
@@ -251,7 +277,7 @@ private:
   DiffusionMedium<T> cut(const DiffusionMedium<T>& medium, std::vector<Span>& spans);
   /** action(from, to, n): for a row of the region, its n values in the volume and in the box. */
   template <class Action>
-  void forRegion(const Action& action) const;
+  void forRegion(const ParallelFor& loop, const Action& action) const;
   /** Whether the voxel one step along axis d, inside the box, belongs to the active region. */
   bool isActive(int d, const int at[3], int step) const;
 
@@ -305,12 +331,20 @@ private:
   /** False, with BadInput, where a source lies outside the domain. */
   template <class T>
   bool startsInside(const T* q, DiffusionReport& report) const;
+  /** The sum of term(i) over the voxels, in an order that threads do not change. */
+  template <class Term>
+  double sumOf(const Term& term) const;
   template <class T>
   void balance(const T* q, const double* phi, DiffusionReport& report) const;
-  /** Of stepExplicit (c dt = step) and, where `local`, of stepLocal (step = courant). */
+  /**
+   * Of stepExplicit (c dt = step) and, where `local`, of stepLocal (step = courant). `store`: the
+   * buffer that phi is, or null.
+   */
   template <class T>
-  DiffusionReport march(
-    const T* q, double* phi, int steps, double step, bool local, const DiffusionControl& control);
+  DiffusionReport march(const T* q, double* phi, Buffer<double>* store, int steps, double step,
+    bool local, const DiffusionControl& control);
+  /** Why a step is none; empty where it is one. */
+  std::string badStep(double cdt) const;
   /** What walls close off without a sink, though sources in it cancel: its voxels. */
   using ClosedPart = std::vector<std::int64_t>;
   /**
@@ -343,7 +377,7 @@ private:
   void estimateError(
     const double* phi, const float* z, double scaled, double factor, DiffusionReport& report) const;
 
-  ParallelFor parallelFor;
+  WatchedFor parallelFor;
   Grid volume;                              ///< the medium's
   Grid box;                                 ///< the operator's: of an active region, around it
   std::array<int, 3> corner{ { 0, 0, 0 } }; ///< of the box in the volume

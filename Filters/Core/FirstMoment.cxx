@@ -121,18 +121,35 @@ std::int64_t FirstMomentSolver::bytes() const
 
 //------------------------------------------------------------------------------
 template <class T>
-DiffusionReport FirstMomentSolver::setMedium(const DiffusionMedium<T>& medium)
+DiffusionReport FirstMomentSolver::setMedium(
+  const DiffusionMedium<T>& medium, const DiffusionProgress& progress)
 {
   const double began = now();
+  const WatchedFor::Asking asking(this->parallelFor, progress);
   DiffusionReport report;
+  try
   {
-    DiffusionSolver check(this->parallelFor); // knows what a medium may be, and says what is wrong
-    report = check.setMedium(medium);
+    // knows what a medium may be, and says what is wrong
+    report = DiffusionSolver(this->parallelFor).check(medium);
+    if (report.reason != StopReason::Converged)
+    {
+      return report;
+    }
+    this->prepare(medium);
   }
-  if (report.reason != StopReason::Converged)
+  catch (const Interrupted&)
   {
-    return report;
+    report.reason = StopReason::Cancelled;
+    report.message = "cancelled while setting up";
   }
+  report.seconds = now() - began;
+  report.bytes = this->bytes();
+  return report;
+}
+
+template <class T>
+void FirstMomentSolver::prepare(const DiffusionMedium<T>& medium)
+{
   this->box = medium.grid;
   const std::array<int, 3>& n = this->box.dims;
   const std::int64_t size = this->box.size();
@@ -202,9 +219,6 @@ DiffusionReport FirstMomentSolver::setMedium(const DiffusionMedium<T>& medium)
         }
       }
     });
-  report.seconds = now() - began;
-  report.bytes = this->bytes();
-  return report;
 }
 
 //------------------------------------------------------------------------------
@@ -212,8 +226,11 @@ void FirstMomentSolver::reset()
 {
   for (Faces& f : this->faces)
   {
-    std::fill(f.E.data(), f.E.data() + f.E.size(), 0.);
-    std::fill(f.lowE.data(), f.lowE.data() + f.lowE.size(), 0.);
+    if (this->lag != 0.) // else no step has touched them
+    {
+      f.E.allocate(f.E.size());
+      f.lowE.allocate(f.lowE.size());
+    }
   }
   this->lag = 0.;
 }
@@ -231,12 +248,13 @@ double FirstMomentSolver::courantBound() const
   return sum > 0. ? std::sqrt(3. / sum) : std::sqrt(3.) * this->box.smallestSpacing();
 }
 
-double FirstMomentSolver::stabilityBound()
+double FirstMomentSolver::stabilityBound(const DiffusionProgress& progress)
 {
   if (this->stability > 0.)
   {
     return this->stability;
   }
+  const WatchedFor::Asking asking(this->parallelFor, progress);
   const double courant = this->courantBound();
   // Gershgorin's bound of the eigenvalues of M^-1 grad^T m^-1 grad, over 4: it grows with c dt.
   const auto load = [](double t, const double(&G)[6], const double(&h)[3], const bool(&border)[6],
@@ -262,50 +280,57 @@ double FirstMomentSolver::stabilityBound()
   // Beyond this no step is worth its name; the search starts from it in each row.
   const double most = 1e6 * courant;
   std::vector<double> bounds(static_cast<std::size_t>(this->rows()));
-  ForRows(this->parallelFor, this->rows(), this->box.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  const auto search = [&](std::int64_t begin, std::int64_t end)
+  {
+    for (std::int64_t r = begin; r < end; ++r)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      const Row rows[3] = { Row(this->box, 0, r), Row(this->box, 1, r), Row(this->box, 2, r) };
+      double bound = most;
+      for (int x = 0; x < n[0]; ++x)
       {
-        const Row rows[3] = { Row(this->box, 0, r), Row(this->box, 1, r), Row(this->box, 2, r) };
-        double bound = most;
-        for (int x = 0; x < n[0]; ++x)
+        double G[6] = { 0., 0., 0., 0., 0., 0. };
+        bool border[6] = { false, false, false, false, false, false };
+        for (int d = 0; d < 3; ++d)
         {
-          double G[6] = { 0., 0., 0., 0., 0., 0. };
-          bool border[6] = { false, false, false, false, false, false };
-          for (int d = 0; d < 3; ++d)
+          const Row& row = rows[d];
+          const Faces& f = this->faces[static_cast<std::size_t>(d)];
+          if (row.none)
           {
-            const Row& row = rows[d];
-            const Faces& f = this->faces[static_cast<std::size_t>(d)];
-            if (row.none)
-            {
-              continue;
-            }
-            const std::int64_t i = row.begin + x;
-            border[2 * d] = d == 0 ? x == 0 : row.first;
-            border[2 * d + 1] = d == 0 ? x + 1 == n[0] : row.last;
-            G[2 * d] = static_cast<double>(
-              border[2 * d] ? f.lowConductance[row.low + x] : f.conductance[i - row.next]);
-            G[2 * d + 1] = static_cast<double>(f.conductance[i]);
+            continue;
           }
-          const double sigma = static_cast<double>(this->sigma_a[rows[0].begin + x]);
-          if (load(bound, G, h, border, sigma, above) <= 1. ||
-            load(bound, G, h, border, sigma, exact) <= 1.)
-          {
-            continue; // does not lower the bound
-          }
-          double low = courant; // stable by construction
-          double high = bound;
-          while (high - low > 1e-6 * low)
-          {
-            const double middle = std::sqrt(low * high);
-            (load(middle, G, h, border, sigma, exact) <= 1. ? low : high) = middle;
-          }
-          bound = low;
+          const std::int64_t i = row.begin + x;
+          border[2 * d] = d == 0 ? x == 0 : row.first;
+          border[2 * d + 1] = d == 0 ? x + 1 == n[0] : row.last;
+          G[2 * d] = static_cast<double>(
+            border[2 * d] ? f.lowConductance[row.low + x] : f.conductance[i - row.next]);
+          G[2 * d + 1] = static_cast<double>(f.conductance[i]);
         }
-        bounds[static_cast<std::size_t>(r)] = bound;
+        const double sigma = static_cast<double>(this->sigma_a[rows[0].begin + x]);
+        if (load(bound, G, h, border, sigma, above) <= 1. ||
+          load(bound, G, h, border, sigma, exact) <= 1.)
+        {
+          continue; // does not lower the bound
+        }
+        double low = courant; // stable by construction
+        double high = bound;
+        while (high - low > 1e-6 * low)
+        {
+          const double middle = std::sqrt(low * high);
+          (load(middle, G, h, border, sigma, exact) <= 1. ? low : high) = middle;
+        }
+        bound = low;
       }
-    });
+      bounds[static_cast<std::size_t>(r)] = bound;
+    }
+  };
+  try
+  {
+    ForRows(this->parallelFor, this->rows(), this->box.size(), search);
+  }
+  catch (const Interrupted&)
+  {
+    return 0.;
+  }
   this->stability = *std::min_element(bounds.begin(), bounds.end());
   return this->stability;
 }
@@ -317,6 +342,7 @@ void FirstMomentSolver::relaxOver(double length)
   {
     return;
   }
+  this->relaxedOver = -1.; // until it is done
   const int nx = this->box.dims[0];
   ForRows(this->parallelFor, this->rows(), this->box.size(),
     [&](std::int64_t begin, std::int64_t end)
@@ -358,6 +384,7 @@ void FirstMomentSolver::weighAbsorption(double length)
   {
     return;
   }
+  this->cdt = -1.; // until it is done
   const int nx = this->box.dims[0];
   ForRows(this->parallelFor, this->rows(), this->box.size(),
     [&](std::int64_t begin, std::int64_t end)
@@ -376,7 +403,7 @@ void FirstMomentSolver::stepE(const double* phi)
 {
   const int nx = this->box.dims[0];
   const double* beyond = this->zeros.data();
-  ForRows(this->parallelFor, this->rows(), this->box.size(),
+  ForRows(this->parallelFor.whole(), this->rows(), this->box.size(),
     [&](std::int64_t begin, std::int64_t end)
     {
       for (std::int64_t r = begin; r < end; ++r)
@@ -420,7 +447,7 @@ FirstMomentSolver::Sums FirstMomentSolver::stepPhi(const T* q, double* phi)
 {
   const int nx = this->box.dims[0];
   std::vector<Sums> partial(static_cast<std::size_t>(this->rows()));
-  ForRows(this->parallelFor, this->rows(), this->box.size(),
+  ForRows(this->parallelFor.whole(), this->rows(), this->box.size(),
     [&](std::int64_t begin, std::int64_t end)
     {
       std::vector<double> divergence(static_cast<std::size_t>(nx));
@@ -520,7 +547,28 @@ template <class T>
 FirstMomentReport FirstMomentSolver::step(
   const T* q, double* phi, int steps, double length, const DiffusionControl& control)
 {
+  const double began = now();
+  const WatchedFor::Asking asking(this->parallelFor, control.progress);
   FirstMomentReport report;
+  try
+  {
+    this->march(q, phi, steps, length, control, report);
+  }
+  catch (const Interrupted&)
+  {
+    report.reason = StopReason::Cancelled;
+    report.message = report.iterations > 0
+      ? "cancelled; the residual is that of the last step, not recomputed"
+      : "cancelled before the first step";
+  }
+  report.seconds = now() - began;
+  return report;
+}
+
+template <class T>
+void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
+  const DiffusionControl& control, FirstMomentReport& report)
+{
   const double began = now();
   // The margin is rounding's: the bound itself is allowed.
   constexpr double margin = 1. + 1e-6;
@@ -533,8 +581,9 @@ FirstMomentReport FirstMomentSolver::step(
          << this->stabilityBound() << "] (length; a step goes as far as the light up to "
          << this->courantBound() << ")";
     report.message = text.str();
-    return report;
+    return;
   }
+  report.residual = -1.;
   const int nx = this->box.dims[0];
   const std::int64_t size = this->box.size();
   const double V = this->box.voxelVolume();
@@ -560,6 +609,12 @@ FirstMomentReport FirstMomentSolver::step(
   }
   const double goal = control.tolerance * std::sqrt(q2);
 
+  this->parallelFor.tell(0.);
+  Touch(phi, size, this->parallelFor);
+  for (Faces& f : this->faces)
+  {
+    Touch(f.E.data(), f.E.size(), this->parallelFor);
+  }
   this->weighAbsorption(length);
   report.bytes = this->bytes() + size * static_cast<std::int64_t>(sizeof(double));
   report.reason = StopReason::MaxIterations;
@@ -569,6 +624,8 @@ FirstMomentReport FirstMomentSolver::step(
     // E goes from where it is to half a step after phi, phi from there half a step further.
     this->relaxOver(this->lag + 0.5 * length);
     this->stepE(phi);
+    this->lag = -0.5 * length;
+    this->parallelFor.poll();
     const Sums sums = this->stepPhi(q, phi);
     this->lag = 0.5 * length;
     report.emittedEnergy += qSum * V * length;
@@ -576,6 +633,7 @@ FirstMomentReport FirstMomentSolver::step(
     report.escapedEnergy += sums.escaped * V * length;
     report.storedEnergy += sums.stored * V * length;
     report.escaped = sums.escaped * V;
+    report.residual = q2 > 0. ? std::sqrt(sums.rate2 / q2) : std::sqrt(sums.rate2);
     ++report.iterations;
     report.fineApplications += 1.;
     if (!std::isfinite(sums.rate2))
@@ -593,10 +651,11 @@ FirstMomentReport FirstMomentSolver::step(
       control.intermediate(phi);
       seen = now();
     }
-    if (control.progress && !control.progress(static_cast<double>(i + 1) / steps))
+    const double fraction = static_cast<double>(i + 1) / steps;
+    this->parallelFor.tell(fraction);
+    if (control.progress && !control.progress(fraction))
     {
-      report.reason = StopReason::Cancelled;
-      break;
+      throw Interrupted();
     }
   }
   const double last = this->residual(q, phi);
@@ -613,60 +672,69 @@ FirstMomentReport FirstMomentSolver::step(
         }
         return s;
       });
-  report.seconds = now() - began;
-  return report;
 }
 
 //------------------------------------------------------------------------------
 template <class T>
-void FirstMomentSolver::flux(const double* phi, T* E) const
+bool FirstMomentSolver::flux(const double* phi, T* E, const DiffusionProgress& progress) const
 {
+  const WatchedFor::Asking asking(this->parallelFor, progress);
   const int nx = this->box.dims[0];
-  ForRows(this->parallelFor, this->rows(), this->box.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  const auto write = [&](std::int64_t begin, std::int64_t end)
+  {
+    for (std::int64_t r = begin; r < end; ++r)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      const Row rows[3] = { Row(this->box, 0, r), Row(this->box, 1, r), Row(this->box, 2, r) };
+      for (int x = 0; x < nx; ++x)
       {
-        const Row rows[3] = { Row(this->box, 0, r), Row(this->box, 1, r), Row(this->box, 2, r) };
-        for (int x = 0; x < nx; ++x)
+        const std::int64_t i = r * nx + x;
+        for (int d = 0; d < 3; ++d)
         {
-          const std::int64_t i = r * nx + x;
-          for (int d = 0; d < 3; ++d)
+          const Row& row = rows[d];
+          if (row.none)
           {
-            const Row& row = rows[d];
-            if (row.none)
-            {
-              E[3 * i + d] = T(0);
-              continue;
-            }
-            const Faces& f = this->faces[static_cast<std::size_t>(d)];
-            // from E's time to phi's
-            const auto advanced = [&](double e, float conductance, double difference, bool border)
-            {
-              const double G = static_cast<double>(conductance);
-              return e + relaxationOf(G, row.h, border, this->lag) * (G * difference - e);
-            };
-            const bool first = d == 0 ? x == 0 : row.first;
-            const bool last = d == 0 ? x + 1 == nx : row.last;
-            const double high =
-              advanced(f.E[i], f.conductance[i], phi[i] - (last ? 0. : phi[i + row.next]), last);
-            const double low = first
-              ? advanced(f.lowE[row.low + x], f.lowConductance[row.low + x], -phi[i], true)
-              : advanced(f.E[i - row.next], f.conductance[i - row.next], phi[i - row.next] - phi[i],
-                  false);
-            E[3 * i + d] = static_cast<T>(0.5 * (low + high));
+            E[3 * i + d] = T(0);
+            continue;
           }
+          const Faces& f = this->faces[static_cast<std::size_t>(d)];
+          // from E's time to phi's
+          const auto advanced = [&](double e, float conductance, double difference, bool border)
+          {
+            const double G = static_cast<double>(conductance);
+            return e +
+              relaxationOf(G, row.h, border, std::max(0., this->lag)) * (G * difference - e);
+          };
+          const bool first = d == 0 ? x == 0 : row.first;
+          const bool last = d == 0 ? x + 1 == nx : row.last;
+          const double high =
+            advanced(f.E[i], f.conductance[i], phi[i] - (last ? 0. : phi[i + row.next]), last);
+          const double low = first
+            ? advanced(f.lowE[row.low + x], f.lowConductance[row.low + x], -phi[i], true)
+            : advanced(
+                f.E[i - row.next], f.conductance[i - row.next], phi[i - row.next] - phi[i], false);
+          E[3 * i + d] = static_cast<T>(0.5 * (low + high));
         }
       }
-    });
+    }
+  };
+  try
+  {
+    ForRows(this->parallelFor, this->rows(), this->box.size(), write);
+  }
+  catch (const Interrupted&)
+  {
+    return false;
+  }
+  return true;
 }
 
 //------------------------------------------------------------------------------
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
-  template DiffusionReport FirstMomentSolver::setMedium<T>(const DiffusionMedium<T>&);             \
+  template DiffusionReport FirstMomentSolver::setMedium<T>(                                        \
+    const DiffusionMedium<T>&, const DiffusionProgress&);                                          \
   template FirstMomentReport FirstMomentSolver::step<T>(                                           \
     const T*, double*, int, double, const DiffusionControl&);                                      \
-  template void FirstMomentSolver::flux<T>(const double*, T*) const;
+  template bool FirstMomentSolver::flux<T>(const double*, T*, const DiffusionProgress&) const;
 LIGHTTRANSPORT_INSTANTIATE(float)
 LIGHTTRANSPORT_INSTANTIATE(double)
 #undef LIGHTTRANSPORT_INSTANTIATE

@@ -70,7 +70,8 @@ public:
 
   /** Reads the medium once, and sets E to 0. 56 bytes per voxel. Answers as DiffusionSolver's. */
   template <class T>
-  DiffusionReport setMedium(const DiffusionMedium<T>& medium);
+  DiffusionReport setMedium(
+    const DiffusionMedium<T>& medium, const DiffusionProgress& progress = {});
 
   /**
    * Time steps of length c dt (a length, > 0, up to stabilityBound) from phi and the E that an
@@ -88,12 +89,15 @@ public:
 
   /** c dt at which a step goes as far as the wave: sqrt(3 / sum 1/h^2). Stable in any medium. */
   double courantBound() const;
-  /** c dt up to which a step is stable in this medium; at least courantBound. */
-  double stabilityBound();
+  /** c dt up to which a step is stable in this medium; at least courantBound. 0: cancelled. */
+  double stabilityBound(const DiffusionProgress& progress = {});
 
-  /** E at phi's time and the voxels' centres, along the grid's axes; 3 values per voxel. */
+  /**
+   * E at phi's time and the voxels' centres, along the grid's axes; 3 values per voxel. False where
+   * `progress` ended it.
+   */
   template <class T>
-  void flux(const double* phi, T* E) const;
+  bool flux(const double* phi, T* E, const DiffusionProgress& progress = {}) const;
 
   std::int64_t bytes() const;
   const Grid& grid() const { return this->box; }
@@ -115,6 +119,12 @@ private:
   struct Row;
   struct Sums;
 
+  template <class T>
+  void prepare(const DiffusionMedium<T>& medium);
+  template <class T>
+  void march(const T* q, double* phi, int steps, double cdt, const DiffusionControl& control,
+    FirstMomentReport& report);
+
   std::int64_t rows() const;
   /** Fills the relaxations for a step of E over `length`. */
   void relaxOver(double length);
@@ -126,12 +136,12 @@ private:
   template <class T>
   double residual(const T* q, const double* phi) const;
 
-  ParallelFor parallelFor;
+  WatchedFor parallelFor;
   Grid box;
   std::array<Faces, 3> faces;
   Buffer<float> sigma_a, weight; // (1 - exp(-sigma_a c dt)) / (sigma_a c dt)
   std::vector<double> zeros;     // a row of phi beyond the border
-  double lag = 0.;               // c t by which E is behind phi
+  double lag = 0.;               // c t by which E is behind phi; negative: cancelled between them
   double relaxedOver = 0.;       // what the relaxations are made for
   double cdt = 0.;               // what the weights are made for
   double stability = 0.;         // 0: not known yet

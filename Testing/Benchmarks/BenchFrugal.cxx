@@ -7,13 +7,14 @@
  *   bench-frugal [--output FOLDER] [--sections grid,region,warm,cancel,target,budget,knobs] [--size
  * 64]
  *     [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD] [--seed 0]
+ *     [--sizes 128,256] [--moments N]
  *
  *   target  SetTargetError over all scenes: is the target met, is the estimate near the truth?
  *   budget  SetTimeBudget over all scenes and four larger ones: is it kept, is the estimate right?
  *   grid    SetCoarseningFactor over all scenes: the error of a coarser grid
  *   region  an active region against the full solve: a tube, the aorta of thorax_ct, open matter
  *   warm    one seed of eight moved in a converged 128^3 field: 20 moves
- *   cancel  how soon a solve returns that is told to stop, 128^3 and 256^3
+ *   cancel  how soon a solve returns that is told to stop, at random moments, on grids of --sizes
  *   knobs   time against error for every knob, on two media
  *
  * "All scenes" are those that the estimate was tuned on, or, with --seed above 0, 40 others drawn
@@ -30,8 +31,9 @@
 #include "vtkLightSeedFilter.h"
 #include "vtkLightTransportArrays.h"
 
-#include "vtkCallbackCommand.h"
+#include "vtkCommand.h"
 #include "vtkDataArray.h"
+#include "vtkDataObject.h"
 #include "vtkDoubleArray.h"
 #include "vtkNew.h"
 #include "vtkObject.h"
@@ -71,7 +73,9 @@ struct Options
   int most = 96;
   int repeat = 5;
   int threads = 2;
-  int seed = 0; // of random scenes; 0: the fixed ones
+  int seed = 0;                       // of random scenes; 0: the fixed ones
+  std::vector<int> sizes{ 128, 256 }; // of `cancel`
+  int moments = -1;                   // of `cancel`; 120, 70 or 12, by the size
   bool has(const char* section) const
   {
     return std::find(this->sections.begin(), this->sections.end(), section) != this->sections.end();
@@ -620,64 +624,196 @@ void MeasureWarmStarts(const Options& options)
 }
 
 //------------------------------------------------------------------------------
-/** How long after a wish to stop, at any moment of a solve, is it over? */
+/** One way of solving, as MeasureCancelling stops it. */
+struct Way
+{
+  std::string name;
+  Setter set;
+  bool random = false; ///< stopped at random moments, besides having its questions timed
+};
+
+/** Asks to stop once it is wished; the longest time between two questions. */
+class Watcher : public vtkCommand
+{
+public:
+  static Watcher* New() { return new Watcher; }
+  void begin()
+  {
+    this->last = now();
+    this->longest = 0.;
+    this->where = 0.;
+  }
+  void end(double fraction) { this->tick(fraction); }
+  void Execute(vtkObject* caller, unsigned long, void*) override
+  {
+    auto* algorithm = static_cast<vtkAlgorithm*>(caller);
+    this->tick(algorithm->GetProgress());
+    if (this->wish)
+    {
+      algorithm->SetAbortExecute(1);
+    }
+  }
+  std::atomic<bool> wish{ false };
+  double longest = 0., where = 0.;
+
+private:
+  void tick(double fraction)
+  {
+    const double at = now();
+    if (at - this->last > this->longest)
+    {
+      this->longest = at - this->last;
+      this->where = fraction;
+    }
+    this->last = at;
+  }
+  double last = 0.;
+};
+
+/**
+ * How long after a wish to stop is a solve over? At moments drawn at random, and by the longest
+ * time that it goes without asking, in every way of solving.
+ */
 void MeasureCancelling(const Options& options)
 {
-  Table csv(options, "frugal-cancel", "voxels,asked,took");
+  Table csv(options, "frugal-cancel", "way,voxels,asked,took");
   std::printf(
-    "\n## Cancelling a solve from darkness, 40 moments evenly over it\n\n"
-    "| size | a whole solve, s | ms until it returns, median | most | with a field that may "
-    "be shown |\n|---|---|---|---|---|\n");
-  for (const int n : { 128, 256 })
+    "\n## Cancelling: ms until a solve from darkness returns, at moments drawn at random\n\n"
+    "| size, way | a whole solve, s | longest time unasked, ms (at progress) | stopped | "
+    "median | 95 %% | most | with a finite field |\n|---|---|---|---|---|---|---|---|\n");
+  const auto steps = [](int mode, int number)
+  {
+    return [=](vtkLightDiffusionFilter* f)
+    {
+      f->SetMode(mode);
+      f->SetNumberOfSteps(number);
+    };
+  };
+  using Filter = vtkLightDiffusionFilter;
+  std::mt19937 random(7);
+  for (const int n : options.sizes)
   {
     const vtkSmartPointer<vtkImageData> image =
       WithSeeds(Tissue(n, .99, 1e-4), { { .35 * n, .4 * n, .5 * n, 2., 1. } });
-    const double whole = Solve(
-      image, [](vtkLightDiffusionFilter*) {}, 1, nullptr)
-                           .seconds;
-    std::vector<double> took;
-    int shown = 0;
-    int cancelled = 0;
-    for (int i = 0; i < 40; ++i)
+    const std::vector<Way> ways{
+      { "steady", [](Filter*) {}, true },
+      { "explicit", steps(Filter::Explicit, 40), true },
+      { "steady, Flux", [](Filter* f) { f->ComputeFluxOn(); } },
+      { "local steps",
+        [&](Filter* f)
+        {
+          steps(Filter::Explicit, 20)(f);
+          f->LocalTimeStepOn();
+        } },
+      { "implicit",
+        [&](Filter* f)
+        {
+          steps(Filter::Implicit, 2)(f);
+          f->SetCourantNumber(1000.);
+        } },
+      { "implicit, second order",
+        [&](Filter* f)
+        {
+          steps(Filter::Implicit, 2)(f);
+          f->SetCourantNumber(1000.);
+          f->SetImplicitScheme(Filter::SecondOrder);
+        } },
+      { "first moment",
+        [&](Filter* f)
+        {
+          steps(Filter::Explicit, 10)(f);
+          f->SetModel(Filter::FirstMoment);
+        } },
+      { "Perona-Malik",
+        [&](Filter* f)
+        {
+          steps(Filter::Explicit, 20)(f);
+          f->SetModel(Filter::AnisotropicDiffusion);
+          f->SetInputArrayToProcess(
+            0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "DiffusionCoefficient");
+        } },
+      { "kept solutions", [](Filter* f) { f->KeepSolutionsOn(); } },
+      { "coarser by 2", [](Filter* f) { f->SetCoarseningFactor(2); } },
+      { "coarser by 4", [](Filter* f) { f->SetCoarseningFactor(4); } },
+      { "active region", [](Filter* f) { f->ActiveRegionOn(); } },
+      { "target 1e-2", [](Filter* f) { f->SetTargetError(.01); } },
+      { "budget 0.1 s", [](Filter* f) { f->SetTimeBudget(.1); } },
+      { "budget 2 s", [](Filter* f) { f->SetTimeBudget(2.); } },
+    };
+    for (const Way& way : ways)
     {
-      vtkNew<vtkLightDiffusionFilter> filter;
-      filter->SetInputData(image);
-      std::atomic<bool> wish{ false };
-      vtkNew<vtkCallbackCommand> obey;
-      obey->SetClientData(&wish);
-      obey->SetCallback(
-        [](vtkObject* caller, unsigned long, void* asked, void*)
-        {
-          if (*static_cast<std::atomic<bool>*>(asked))
-          {
-            static_cast<vtkAlgorithm*>(caller)->SetAbortExecute(1);
-          }
-        });
-      filter->AddObserver(vtkCommand::ProgressEvent, obey);
-      double asked = 0.;
-      const double wait = whole * (i + .5) / 40.;
-      std::thread user(
-        [&]
-        {
-          std::this_thread::sleep_for(std::chrono::duration<double>(wait));
-          asked = now();
-          wish = true;
-        });
-      filter->Update();
-      const double ended = now();
-      user.join();
-      if (filter->GetStopReason() == vtkLightDiffusionFilter::Cancelled)
+      if (way.name.find(options.only) == std::string::npos ||
+        (n > 300 && way.name != "steady" && way.name != "explicit"))
       {
-        ++cancelled;
-        took.push_back(1e3 * (ended - asked));
-        csv.add(n * n * n, wait, 1e-3 * took.back());
-        const std::vector<double> field = Values(filter);
-        shown += std::all_of(field.begin(), field.end(), [](double v) { return std::isfinite(v); });
+        continue;
       }
+      const auto solve = [&](vtkLightDiffusionFilter* filter, Watcher* watcher)
+      {
+        filter->SetInputData(image);
+        way.set(filter);
+        filter->AddObserver(vtkCommand::ProgressEvent, watcher);
+        watcher->begin();
+        filter->Update();
+        watcher->end(2.);
+      };
+      std::vector<double> whole, longest;
+      double where = 0.;
+      for (int i = 0; i < std::min(3, options.repeat); ++i)
+      {
+        vtkNew<vtkLightDiffusionFilter> filter;
+        vtkNew<Watcher> watcher;
+        const double began = now();
+        solve(filter, watcher);
+        whole.push_back(now() - began);
+        if (longest.empty() || watcher->longest > *std::max_element(longest.begin(), longest.end()))
+        {
+          where = watcher->where;
+        }
+        longest.push_back(watcher->longest);
+      }
+      const double seconds = median(whole);
+      std::vector<double> took;
+      int shown = 0;
+      int cancelled = 0;
+      const int moments = !way.random ? 0
+        : options.moments >= 0        ? options.moments
+        : n <= 128                    ? 120
+        : n <= 256                    ? 70
+                                      : 12;
+      std::uniform_real_distribution<double> moment(0., seconds);
+      for (int i = 0; i < moments; ++i)
+      {
+        vtkNew<vtkLightDiffusionFilter> filter;
+        vtkNew<Watcher> watcher;
+        double asked = 0.;
+        const double wait = moment(random);
+        std::thread user(
+          [&]
+          {
+            std::this_thread::sleep_for(std::chrono::duration<double>(wait));
+            asked = now();
+            watcher->wish = true;
+          });
+        solve(filter, watcher);
+        const double ended = now();
+        user.join();
+        if (filter->GetStopReason() == vtkLightDiffusionFilter::Cancelled)
+        {
+          ++cancelled;
+          took.push_back(1e3 * (ended - asked));
+          csv.add(Quoted(way.name), std::int64_t(n) * n * n, wait, 1e-3 * took.back());
+          const std::vector<double> field = Values(filter);
+          shown += !field.empty() &&
+            std::all_of(field.begin(), field.end(), [](double v) { return std::isfinite(v); });
+        }
+      }
+      std::sort(took.begin(), took.end());
+      std::printf("| %d³, %s | %.3f | %.0f (%.2f) | %d | %.0f | %.0f | %.0f | %d |\n", n,
+        way.name.c_str(), seconds, 1e3 * *std::max_element(longest.begin(), longest.end()), where,
+        cancelled, median(took), took.empty() ? 0. : took[(took.size() - 1) * 95 / 100],
+        took.empty() ? 0. : took.back(), shown);
+      std::fflush(stdout);
     }
-    std::printf("| %d³ | %.3f | %.0f | %.0f | %d of %d |\n", n, whole, median(took),
-      took.empty() ? 0. : *std::max_element(took.begin(), took.end()), shown, cancelled);
-    std::fflush(stdout);
   }
 }
 
@@ -793,6 +929,18 @@ bool Parse(int argc, char* argv[], Options& options)
     {
       options.repeat = std::atoi(value);
     }
+    else if (option == "--sizes")
+    {
+      options.sizes.clear();
+      for (const std::string& size : split(value))
+      {
+        options.sizes.push_back(std::atoi(size.c_str()));
+      }
+    }
+    else if (option == "--moments")
+    {
+      options.moments = std::atoi(value);
+    }
     else if (option == "--seed")
     {
       options.seed = std::atoi(value);
@@ -820,7 +968,7 @@ int main(int argc, char* argv[])
       "usage: bench-frugal [--output FOLDER] [--sections "
       "grid,region,warm,cancel,target,budget,knobs]\n"
       "  [--size 64] [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD]\n"
-      "  [--seed 0]\n");
+      "  [--seed 0] [--sizes 128,256] [--moments N]\n");
     return 2;
   }
   if (options.output.empty())
