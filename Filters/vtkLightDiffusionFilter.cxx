@@ -944,7 +944,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     before.reason = lighttransport::StopReason::BadInput;
     const double perPoint = this->TimeBudget / static_cast<double>(size);
     // Light that stays where it is: its region alone. To find out costs some per cent of a solve,
-    // and 30 ms at the least.
+    // which goes on from what that came to.
     if (!(this->TimeBudget > 0. && this->TimeBudget < 0.06))
     {
       lighttransport::DiffusionSolver regional(vtkLightTransportParallelFor());
@@ -988,6 +988,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
     if (hasty)
     {
+      std::fill(phi.data(), phi.data() + size, 0.); // what a region came to
       lighttransport::CoarseDiffusion preview(vtkLightTransportParallelFor());
       before = withMedium(
         [&](const auto& medium) { return preview.setMedium(medium, 4, true, progress); });

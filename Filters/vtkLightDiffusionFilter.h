@@ -269,8 +269,9 @@ public:
   /**
    * Steady only: solve on the points that light reaches from the sources, foretold by a front and
    * grown while more than ActiveThreshold (of the largest |phi|) would stand beyond, with phi = 0
-   * there: light that stays in a vessel does not cost the whole volume; light that fills a quarter
-   * of it, or is expected to fill a tenth, is solved on the whole after what found that out. With
+   * there: light that stays in a vessel does not cost the whole volume; where the region would be a
+   * tenth of it, or takes longer to find than 8 % of a whole solve, that goes on from what the
+   * search came to. With
    * TargetError the threshold is at most 1e-6 sqrt(TargetError), so that the cut does not show in
    * it. Fluence is 0 outside. Default off: the residual's equations
    * hold everywhere.
@@ -308,8 +309,8 @@ public:
    * voxels within six decades of the largest |phi*|, with phi* the exact solution of the discrete
    * equations on the full grid. Where above 0, a steady solve chooses what does, in this order:
    * from the last state, with Continue, cells of two points and corrections by the full grid's
-   * equations; where light stays in less than an eighth of the volume, that region alone (to find
-   * out costs up to a fifth of a solve); the full grid, with as many iterations as it takes.
+   * equations; where light stays in some per cent of the volume, that region alone (to find out
+   * costs less than a tenth of a solve); the full grid, with as many iterations as it takes.
    * GetEstimatedError tells what was reached, GetActiveFraction, GetUsedCoarseningFactor and
    * GetNumberOfIterationsUsed what was chosen; Tolerance only ends it earlier. Default 0: Tolerance
    * decides.

@@ -20,15 +20,53 @@ constexpr double LeastStep = 0.02;
  * than it was. */
 constexpr double Spare = 2.3;
 constexpr double Brighter = 1.;
+/** A first look takes a voxel of so many along each axis. */
+constexpr int Pitch = 4;
+/** What light may lose by spreading, which the costs don't hold: it goes as 1 / r at the most. */
+constexpr double Spreading = 4.;
 /** The part of a region that is not worth another solve when it turns out to be lit as well. */
 constexpr double Few = 0.005;
 
 /** c of 2 (cosh c - 1) = x */
 double decay(double x)
 {
-  const double half = 1. + 0.5 * x;
-  const double c = x < 1e-2 ? std::sqrt(x) : std::log(half + std::sqrt(half * half - 1.));
-  return std::max(c, LeastStep);
+  const float half = static_cast<float>(1. + 0.5 * std::min(x, 1e30));
+  const float c = x < 1e-2 ? std::sqrt(static_cast<float>(x))
+    : x > 1e6              ? std::log(2.f * half)
+                           : std::log(half + std::sqrt(half * half - 1.f));
+  return std::max(static_cast<double>(c), LeastStep);
+}
+
+/**
+ * T of sum over the axes of ((T - from) / along)^2 = 1, over those that it comes along; `from` is
+ * infinite where there is no neighbour.
+ */
+template <class Value>
+double Arrival(const Value from[3], const Value along[3])
+{
+  int order[3] = { 0, 1, 2 };
+  std::sort(order, order + 3, [from](int a, int b) { return from[a] < from[b]; });
+  const double first = static_cast<double>(from[order[0]]);
+  double result = std::numeric_limits<double>::infinity();
+  double w = 0.;
+  double wf = 0.;
+  double wff = 0.;
+  for (int d = 0; d < 3 && static_cast<double>(from[order[d]]) < result; ++d)
+  {
+    const double c = static_cast<double>(along[order[d]]);
+    const double wd = 1. / (c * c);
+    const double f = static_cast<double>(from[order[d]]) - first;
+    w += wd;
+    wf += wd * f;
+    wff += wd * f * f;
+    const double root = wf * wf - w * (wff - 1.);
+    if (!(root >= 0.))
+    {
+      break;
+    }
+    result = std::min(result, first + (wf + std::sqrt(root)) / w);
+  }
+  return result;
 }
 } // namespace
 
@@ -77,62 +115,26 @@ double ActiveRegion<T>::foretell(std::int64_t j) const
   const int at[3] = { static_cast<int>(j % n[0]), static_cast<int>(j / n[0] % n[1]),
     static_cast<int>(j / this->stride[2]) };
   // along each axis the better of two neighbours
-  double from[3];
-  double c[3];
-  int axes = 0;
+  constexpr double never = std::numeric_limits<double>::infinity();
+  double from[3] = { never, never, never };
+  double along[3] = { 0., 0., 0. };
   for (int d = 0; d < 3; ++d)
   {
-    double best = std::numeric_limits<double>::infinity();
-    double bestStep = 0.;
     for (int side = -1; side <= 1; side += 2)
     {
       const std::int64_t i = j + side * this->stride[d];
       if (at[d] + side >= 0 && at[d] + side < n[d] && this->state[i] == Lit)
       {
-        const double along = this->step(i, j, d);
-        if (static_cast<double>(this->cost[i]) + along < best + bestStep)
+        const double way = this->step(i, j, d);
+        if (static_cast<double>(this->cost[i]) + way < from[d] + along[d])
         {
-          best = static_cast<double>(this->cost[i]);
-          bestStep = along;
+          from[d] = static_cast<double>(this->cost[i]);
+          along[d] = way;
         }
       }
     }
-    if (std::isfinite(best + bestStep))
-    {
-      int p = axes++;
-      for (; p > 0 && from[p - 1] > best; --p)
-      {
-        from[p] = from[p - 1];
-        c[p] = c[p - 1];
-      }
-      from[p] = best;
-      c[p] = bestStep;
-    }
   }
-  if (axes == 0)
-  {
-    return std::numeric_limits<double>::infinity();
-  }
-  double result = from[0] + c[0];
-  // sum w (T - from)^2 = 1 over the axes that it comes along
-  double w = 0.;
-  double wf = 0.;
-  double wff = 0.;
-  for (int d = 0; d < axes && from[d] < result; ++d)
-  {
-    const double wd = 1. / (c[d] * c[d]);
-    const double f = from[d] - from[0];
-    w += wd;
-    wf += wd * f;
-    wff += wd * f * f;
-    const double root = wf * wf - w * (wff - 1.);
-    if (root < 0.)
-    {
-      break;
-    }
-    result = std::min(result, from[0] + (wf + std::sqrt(root)) / w);
-  }
-  return result;
+  return Arrival(from, along);
 }
 
 template <class T>
@@ -201,7 +203,7 @@ std::int64_t ActiveRegion<T>::size() const
 //------------------------------------------------------------------------------
 template <class T>
 template <class Q>
-bool ActiveRegion<T>::start(const Q* q, const ParallelFor& parallelFor)
+bool ActiveRegion<T>::start(const Q* q, double largest, const ParallelFor& parallelFor)
 {
   const std::array<int, 3>& n = this->medium.grid.dims;
   const std::int64_t size = this->medium.grid.size();
@@ -223,7 +225,6 @@ bool ActiveRegion<T>::start(const Q* q, const ParallelFor& parallelFor)
   // What a source does to its own voxel tells how they compare.
   std::vector<double> own;
   double most = 0.;
-  std::int64_t brightest = -1;
   for (std::int64_t r = 0; r < rows; ++r)
   {
     for (std::int64_t i = r * n[0]; lit[static_cast<std::size_t>(r)] && i < (r + 1) * n[0]; ++i)
@@ -240,12 +241,8 @@ bool ActiveRegion<T>::start(const Q* q, const ParallelFor& parallelFor)
       this->sources.push_back(i);
       own.push_back(diagonal > 1e-150 ? std::abs(static_cast<double>(q[i])) / diagonal
                                       : std::numeric_limits<double>::max());
-      if (own.back() > most)
-      {
-        most = own.back();
-        brightest = i;
-      }
-      if (8 * static_cast<std::int64_t>(this->sources.size()) > size)
+      most = std::max(most, own.back());
+      if (static_cast<double>(this->sources.size()) > largest * static_cast<double>(size))
       {
         return false;
       }
@@ -256,56 +253,124 @@ bool ActiveRegion<T>::start(const Q* q, const ParallelFor& parallelFor)
     const double dimmer = own[s] > 0. ? std::log(most) - std::log(own[s]) : this->budget;
     this->push(this->sources[s], std::min(dimmer, this->budget));
   }
-  if (brightest < 0)
+  return !this->fills(largest);
+}
+
+//------------------------------------------------------------------------------
+/**
+ * Fast marching from the sources over every fourth voxel along each axis: what is between two of
+ * them on the line counts. Vessels that the lines miss are walls to it: it says so too seldom.
+ */
+template <class T>
+bool ActiveRegion<T>::fills(double largest) const
+{
+  const std::array<int, 3>& n = this->medium.grid.dims;
+  int m[3];
+  for (int d = 0; d < 3; ++d)
   {
-    return true;
+    m[d] = (n[d] + Pitch - 1) / Pitch;
   }
-  // Straight ways from the brightest: along the axes and the diagonals.
-  int ways = 0;
-  int clear = 0;
-  for (int way = 0; way < 27; ++way)
+  const std::int64_t jump[3] = { 1, m[0], static_cast<std::int64_t>(m[0]) * m[1] };
+  const auto voxelOf = [&](int d, int node)
+  { return std::min(n[d] - 1, Pitch * node + Pitch / 2); };
+  struct Node
   {
-    const int along[3] = { way % 3 - 1, way / 3 % 3 - 1, way / 9 - 1 };
-    double perStep = 0.;
-    std::int64_t ahead = 0;
-    bool usable = way != 13;
+    float cost = std::numeric_limits<float>::infinity();
+    float from[3], along[3]; // by axis: the better neighbour's cost and that of the way from it
+    bool taken = false;
+    Node() { std::fill_n(this->from, 3, std::numeric_limits<float>::infinity()); }
+  };
+  std::vector<Node> nodes(static_cast<std::size_t>(jump[2] * m[2]));
+  std::vector<std::vector<std::int64_t>> waiting(this->queue.size());
+  const auto wait = [&](std::int64_t at, double value)
+  {
+    Node& node = nodes[static_cast<std::size_t>(at)];
+    if (value < static_cast<double>(node.cost) && value <= this->budget - Spreading)
+    {
+      node.cost = static_cast<float>(value);
+      waiting[static_cast<std::size_t>(std::max(0., value) / QueueStep)].push_back(at);
+    }
+  };
+  // from voxel i, `voxels` steps along the axis, forwards or back
+  const auto way = [&](std::int64_t i, int d, int voxels)
+  {
+    double sum = 0.;
+    const std::int64_t ahead = voxels < 0 ? -this->stride[d] : this->stride[d];
+    for (int v = std::abs(voxels); v > 0 && sum < this->budget; --v, i += ahead)
+    {
+      sum += this->open(i + ahead) ? this->step(i, i + ahead, d) : this->budget;
+    }
+    return sum;
+  };
+  for (const std::int64_t i : this->sources)
+  {
+    int at[3] = { static_cast<int>(i % n[0]), static_cast<int>(i / n[0] % n[1]),
+      static_cast<int>(i / this->stride[2]) };
+    double value = this->open(i) ? static_cast<double>(this->cost[i]) : this->budget;
+    std::int64_t node = 0;
+    std::int64_t voxel = i;
     for (int d = 0; d < 3; ++d)
     {
-      usable = usable && (along[d] == 0 || n[d] > 1);
-      perStep += along[d] != 0 && n[d] > 1 ? 1. / this->perArea[d] : 0.;
-      ahead += along[d] * this->stride[d];
+      node += at[d] / Pitch * jump[d];
     }
-    if (!usable)
+    if (static_cast<double>(nodes[static_cast<std::size_t>(node)].cost) < value + 1.)
     {
-      continue;
+      continue; // another source's: much the same
     }
-    ++ways;
-    int at[3] = { static_cast<int>(brightest % n[0]), static_cast<int>(brightest / n[0] % n[1]),
-      static_cast<int>(brightest / this->stride[2]) };
-    std::int64_t i = brightest;
-    double sum = 0.;
-    for (;;)
+    for (int d = 0; d < 3 && value < this->budget; ++d)
     {
-      bool inside = true;
+      const int steps = voxelOf(d, at[d] / Pitch) - at[d];
+      value += way(voxel, d, steps);
+      voxel += steps * this->stride[d];
+    }
+    wait(node, value);
+  }
+  const double many = largest * static_cast<double>(nodes.size());
+  std::int64_t taken = 0;
+  for (std::vector<std::int64_t>& same : waiting)
+  {
+    for (std::size_t p = 0; p < same.size(); ++p) // grows while it is read
+    {
+      const std::int64_t i = same[p];
+      Node& node = nodes[static_cast<std::size_t>(i)];
+      if (node.taken)
+      {
+        continue;
+      }
+      node.taken = true;
+      if (static_cast<double>(++taken) > many)
+      {
+        return true;
+      }
+      const int at[3] = { static_cast<int>(i % m[0]), static_cast<int>(i / m[0] % m[1]),
+        static_cast<int>(i / jump[2]) };
+      const std::int64_t voxel =
+        this->medium.grid.index(voxelOf(0, at[0]), voxelOf(1, at[1]), voxelOf(2, at[2]));
       for (int d = 0; d < 3; ++d)
       {
-        at[d] += along[d];
-        inside = inside && at[d] >= 0 && at[d] < n[d];
+        for (int side = -1; side <= 1; side += 2)
+        {
+          const std::int64_t j = i + side * jump[d];
+          if (at[d] + side < 0 || at[d] + side >= m[d] || nodes[static_cast<std::size_t>(j)].taken)
+          {
+            continue;
+          }
+          Node& next = nodes[static_cast<std::size_t>(j)];
+          const double along = way(voxel, d, voxelOf(d, at[d] + side) - voxelOf(d, at[d]));
+          if (static_cast<double>(node.cost) + along <
+            static_cast<double>(next.from[d] + next.along[d]))
+          {
+            next.from[d] = node.cost;
+            next.along[d] = static_cast<float>(along);
+            wait(j, Arrival(next.from, next.along));
+          }
+        }
       }
-      if (!inside || sum > 0.5 * this->budget || !this->open(i))
-      {
-        clear += !inside && sum <= 0.5 * this->budget;
-        break;
-      }
-      const double a = static_cast<double>(this->medium.D[i]);
-      i += ahead;
-      const double b = static_cast<double>(this->medium.D[i]);
-      const double sigma = this->medium.sigma_a ? static_cast<double>(this->medium.sigma_a[i]) : 0.;
-      sum += b > 1e-150 ? decay(std::min(1e30, 0.5 * sigma * (1. / a + 1. / b) * perStep))
-                        : this->budget;
     }
+    same.clear();
+    same.shrink_to_fit();
   }
-  return 4 * clear < 3 * ways;
+  return false;
 }
 
 //------------------------------------------------------------------------------
@@ -343,7 +408,7 @@ template <class T>
 bool ActiveRegion<T>::advance(std::int64_t limit)
 {
   const std::array<int, 3>& n = this->medium.grid.dims;
-  std::int64_t taken = 0;
+  this->numberTaken = 0;
   bool ended = true;
   this->outgrown = 0;
   for (std::size_t bucket = 0; bucket < this->queue.size(); ++bucket)
@@ -357,13 +422,13 @@ bool ActiveRegion<T>::advance(std::int64_t limit)
       {
         continue; // came by a shorter way
       }
-      if (taken == limit)
+      if (this->numberTaken >= limit)
       {
         ended = false;
         this->state[i] = Unknown; // the rim will tell
         continue;
       }
-      ++taken;
+      ++this->numberTaken;
       ++this->numberLit;
       this->state[i] = Lit;
       this->widen(i);
@@ -516,8 +581,8 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
 //------------------------------------------------------------------------------
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
   template class ActiveRegion<T>;                                                                  \
-  template bool ActiveRegion<T>::start<float>(const float*, const ParallelFor&);                   \
-  template bool ActiveRegion<T>::start<double>(const double*, const ParallelFor&);
+  template bool ActiveRegion<T>::start<float>(const float*, double, const ParallelFor&);           \
+  template bool ActiveRegion<T>::start<double>(const double*, double, const ParallelFor&);
 LIGHTTRANSPORT_INSTANTIATE(float)
 LIGHTTRANSPORT_INSTANTIATE(double)
 #undef LIGHTTRANSPORT_INSTANTIATE

@@ -8,7 +8,8 @@
  *      2 (cosh c - 1) = sigma_a h^2 / D_f, and from voxel to voxel the cost T follows
  *      sum over the axes of ((T - T_d) / c_d)^2 = 1 (fast marching, Sethian 1996, with an untidy
  *      queue, Yatziv, Bartesaghi and Sapiro 2006). It takes no more than `limit` voxels at a time:
- *      what is lost through the sides of a vessel it does not foresee.
+ *      what is lost through the sides of a vessel it does not foresee. A first look, over every
+ *      fourth voxel, tells within a per cent of a solve where light fills open matter.
  *   2. The field solved for on these voxels, with 0 beyond, tells the true costs: dark voxels
  *      are given up, and the front goes on from where the rim is too bright. At a cut one voxel
  *      ahead phi is lower than it would be without it, by 1 - e^-2c in matter that goes on.
@@ -36,13 +37,15 @@ public:
 
   /**
    * Starts the front at all voxels with a source. False where light is certain to fill the volume:
-   * sources in more than an eighth of it, or most straight ways to its border are clear.
+   * more than the part `largest` of it are sources, or of every fourth voxel a front takes more.
    */
   template <class Q>
-  bool start(const Q* q, const ParallelFor& parallelFor);
+  bool start(const Q* q, double largest, const ParallelFor& parallelFor);
 
   /** Lets the front take up to `limit` voxels; true where it has come to its end. */
   bool advance(std::int64_t limit);
+  /** How many it took the last time. */
+  std::int64_t taken() const { return this->numberTaken; }
   /** Whether that went beyond what the last field was solved for on, by more than a few voxels. */
   bool grown() const;
 
@@ -86,6 +89,7 @@ private:
   /** The cost of voxel j from its lit neighbours. */
   double foretell(std::int64_t j) const;
   void push(std::int64_t i, double cost);
+  bool fills(double largest) const;
   /** Foretells the neighbours of a lit voxel. */
   void spread(std::int64_t i);
   void widen(std::int64_t i);
@@ -110,6 +114,7 @@ private:
   int tilesAlongY;
   std::vector<Span> hull, solved; // of voxels, for each row of tiles
   std::int64_t numberLit = 0;
+  std::int64_t numberTaken = 0;
   std::int64_t outgrown = 0; // voxels beyond `solved`
   std::vector<std::int64_t> sources;
   std::vector<std::vector<std::int64_t>> queue; // by cost, in steps of QueueStep

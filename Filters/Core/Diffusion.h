@@ -138,9 +138,14 @@ struct DiffusionControl
    */
   double largestRegion = 0.25;
   /**
+   * Of solveActive: what may be spent before the region is known, as a part of what the whole
+   * volume is expected to cost at the least; then that is solved. Counted in voxels, not measured.
+   */
+  double regionSearch = 0.08;
+  /**
    * Of solveActive: where the region would be larger, answer MaxIterations with an activeFraction
-   * of 1 and phi = 0 instead of solving on the whole volume: the caller knows another way. To find
-   * that out costs some per cent of a full solve.
+   * of 1 and what phi has come to, a start, instead of solving on the whole volume: the caller
+   * knows another way.
    */
   bool regionOrNothing = false;
   /** Called with the field reached, after an iteration, at most once per interval (seconds). */

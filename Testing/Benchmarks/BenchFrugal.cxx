@@ -4,15 +4,15 @@
  * What a solve that is no better than the scene requires costs, and how wrong it is, through the
  * filter as a user runs it:
  *
- *   bench-frugal [--output FOLDER] [--sections grid,region,warm,cancel,target,budget,knobs] [--size
- * 64]
- *     [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD] [--seed 0]
- *     [--sizes 128,256] [--moments N]
+ *   bench-frugal [--output FOLDER] [--sections grid,region,filled,warm,cancel,target,budget,
+ *     knobs] [--size 64] [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD]
+ *     [--seed 0] [--sizes 128,256] [--moments N]
  *
  *   target  SetTargetError over all scenes: is the target met, is the estimate near the truth?
  *   budget  SetTimeBudget over all scenes and four larger ones: is it kept, is the estimate right?
  *   grid    SetCoarseningFactor over all scenes: the error of a coarser grid
  *   region  an active region against the full solve: a tube, the aorta of thorax_ct, open matter
+ *   filled  what the search for a region costs where light fills the volume, of --size
  *   warm    one seed of eight moved in a converged 128^3 field: 20 moves
  *   cancel  how soon a solve returns that is told to stop, at random moments, on grids of --sizes
  *   knobs   time against error for every knob, on two media
@@ -35,6 +35,7 @@
 #include "vtkDataArray.h"
 #include "vtkDataObject.h"
 #include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
 #include "vtkNew.h"
 #include "vtkObject.h"
 #include "vtkPointData.h"
@@ -65,8 +66,8 @@ namespace
 struct Options
 {
   std::string output; // build/dev/frugal, beside the folder of the program
-  std::vector<std::string> sections{ "grid", "region", "warm", "cancel", "target", "budget",
-    "knobs" };
+  std::vector<std::string> sections{ "grid", "region", "filled", "warm", "cancel", "target",
+    "budget", "knobs" };
   std::string data = "../shared/data";
   std::string only;
   int size = 64;
@@ -557,6 +558,75 @@ void MeasureRegions(const Options& options)
 }
 
 //------------------------------------------------------------------------------
+/** What it costs to find out that light fills the volume: a region must not cost more than 10 %. */
+void MeasureFilled(const Options& options)
+{
+  Table csv(options, "frugal-filled", "scene,size,run,seconds,against,cost,active,iterations");
+  std::printf(
+    "\n## Light that fills the volume: the search for a region\n\n"
+    "| scene | full, s | SetActiveRegion | active | full to 1 %%, s | SetTargetError(0.01) "
+    "| active |\n|---|---|---|---|---|---|---|\n");
+  const char* const names[] = { "blobs, albedo 0.99, 1 light", "blobs, albedo 0.999, 4",
+    "layers, spacing 1 1 1, albedo 0.99", "labyrinth, corridors 6",
+    "labyrinth, corridors 3, wall 1e", "noise over 2", "body, noise 1.5, albedo 0.99,",
+    "constant D 1, sigma_a 0.001" };
+  const int n = options.size;
+  std::vector<Scene> scenes = { { "open matter", false, [n](std::string&) { return Open(n); } },
+    { "tissue, albedo 0.999", false, [n](std::string&) {
+       return WithSeeds(Tissue(n, .999, 1e-4), { { .35 * n, .4 * n, .5 * n, 2., 1. } });
+     } } };
+  for (Scene& scene : Scenes(n, 0, ""))
+  {
+    if (std::any_of(std::begin(names), std::end(names),
+          [&](const char* name) { return scene.name.find(name) == 0; }))
+    {
+      scenes.push_back(scene);
+    }
+  }
+  for (Scene& scene : scenes)
+  {
+    if (scene.name.find(options.only) == std::string::npos)
+    {
+      continue;
+    }
+    const vtkSmartPointer<vtkImageData> image = scene.make(scene.name);
+    image->GetFieldData()->Initialize(); // KeepSolutions then solves for the sum
+    const Setter ways[] = { [](vtkLightDiffusionFilter*) {},
+      [](vtkLightDiffusionFilter* f) { f->SetActiveRegion(true); },
+      [](vtkLightDiffusionFilter* f)
+      {
+        f->SetTargetError(.01);
+        f->SetKeepSolutions(true); // never on a region
+      },
+      [](vtkLightDiffusionFilter* f) { f->SetTargetError(.01); } };
+    // In turn, so that quotients mean something on a busy machine.
+    std::vector<double> seconds[4], cost[4];
+    Run last[4];
+    for (int i = 0; i < options.repeat; ++i)
+    {
+      for (std::size_t w = 0; w < 4; ++w)
+      {
+        last[w] = Solve(image, ways[w], 1, nullptr);
+        seconds[w].push_back(last[w].seconds);
+        cost[w].push_back(last[w].seconds / seconds[w / 2 * 2].back() - 1.);
+      }
+    }
+    const auto active = [&](int w) { return 100. * last[w].filter->GetActiveFraction(); };
+    std::printf("| %s, %d³ | %.3f | %+.1f %% | %.1f %% | %.3f | %+.1f %% | %.1f %% |\n",
+      scene.name.c_str(), n, median(seconds[0]), 100. * median(cost[1]), active(1),
+      median(seconds[2]), 100. * median(cost[3]), active(3));
+    for (std::size_t w = 0; w < 4; ++w)
+    {
+      csv.add(Quoted(scene.name), n, w, median(seconds[w]), median(seconds[w / 2 * 2]),
+        median(cost[w]), last[w].filter->GetActiveFraction(),
+        last[w].filter->GetNumberOfIterationsUsed());
+    }
+    std::fflush(stdout);
+  }
+  std::printf("\nMedians of what is added to the same solve without a search, in turn with it.\n");
+}
+
+//------------------------------------------------------------------------------
 void MeasureWarmStarts(const Options& options)
 {
   Table csv(options, "frugal-warm",
@@ -966,7 +1036,7 @@ int main(int argc, char* argv[])
   {
     std::fprintf(stderr,
       "usage: bench-frugal [--output FOLDER] [--sections "
-      "grid,region,warm,cancel,target,budget,knobs]\n"
+      "grid,region,filled,warm,cancel,target,budget,knobs]\n"
       "  [--size 64] [--most 96] [--repeat 5] [--threads 2] [--data FOLDER] [--only WORD]\n"
       "  [--seed 0] [--sizes 128,256] [--moments N]\n");
     return 2;
@@ -981,10 +1051,11 @@ int main(int argc, char* argv[])
   vtkObject::SetGlobalWarningDisplay(
     std::getenv("WARN") ? 1 : 0); // a budget that is used up is no surprise here
   std::printf("# bench-frugal\n\n%d threads, medians of %d.\n", options.threads, options.repeat);
-  const std::pair<const char*, void (*)(const Options&)> sections[] = { { "warm",
-                                                                          MeasureWarmStarts },
-    { "cancel", MeasureCancelling }, { "region", MeasureRegions }, { "grid", MeasureGrids },
-    { "knobs", MeasureKnobs }, { "target", MeasureTargets }, { "budget", MeasureBudgets } };
+  const std::pair<const char*, void (*)(const Options&)> sections[] = {
+    { "warm", MeasureWarmStarts }, { "cancel", MeasureCancelling }, { "region", MeasureRegions },
+    { "filled", MeasureFilled }, { "grid", MeasureGrids }, { "knobs", MeasureKnobs },
+    { "target", MeasureTargets }, { "budget", MeasureBudgets }
+  };
   for (const auto& section : sections)
   {
     if (options.has(section.first))
