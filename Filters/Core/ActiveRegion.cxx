@@ -469,7 +469,13 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
     }
   };
   double largest = 0.;
-  forEach([&](std::size_t, std::int64_t i) { largest = std::max(largest, std::abs(phi[i])); });
+  double squares = 0.;
+  forEach(
+    [&](std::size_t, std::int64_t i)
+    {
+      largest = std::max(largest, std::abs(phi[i]));
+      squares += phi[i] * phi[i];
+    });
   if (!(largest > 0.))
   {
     return rim;
@@ -509,6 +515,7 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
         static_cast<int>(r % static_cast<std::size_t>(n[1])),
         static_cast<int>(r / static_cast<std::size_t>(n[1])) };
       double lost = 0.;
+      double missing = 0.;
       for (int d = 0; d < 3; ++d)
       {
         for (int side = -1; side <= 1; side += 2)
@@ -527,7 +534,8 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
           }
           const double a = static_cast<double>(this->medium.D[i]);
           const double b = static_cast<double>(this->medium.D[j]);
-          rim.leaked += 2. * a * (b / (a + b)) * this->perArea[d] * phi[i];
+          const double out = 2. * a * (b / (a + b)) * this->perArea[d] * phi[i];
+          rim.leaked += out;
           // phi goes as sinh there: the voxel behind tells how fast
           const std::int64_t behind = i - side * this->stride[d];
           const bool known = at[d] - side >= 0 && at[d] - side < n[d];
@@ -536,8 +544,17 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
           const double ratio = before > here && before < 1e100 * here ? before / here : 1.;
           const double measured = std::log(ratio + std::sqrt(ratio * ratio - 1.));
           const double c = std::max({ 0.1, measured, this->step(i, j, d) });
-          lost = std::max(lost, -std::log(-std::expm1(-2. * c)));
+          const double kept = -std::expm1(-2. * c);
+          lost = std::max(lost, -std::log(kept));
+          // phi beyond, were it not cut, and farther on
+          const double passed = std::exp(-c) / kept;
+          missing += out * passed;
+          rim.beyond += phi[i] * passed * (phi[i] * passed) / kept;
         }
+      }
+      if (missing != 0.)
+      {
+        rim.missing.emplace_back(i, missing);
       }
       if (lost > 0. && this->state[i] == Lit &&
         static_cast<double>(this->cost[i]) - lost <= this->budget)
@@ -546,6 +563,7 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
       }
     });
   rim.leaked *= this->medium.grid.voxelVolume();
+  rim.beyond = squares > 0. ? std::sqrt(rim.beyond / squares) : 0.;
   double sum = 0.;
   for (const auto& voxel : front)
   {

@@ -24,6 +24,7 @@
 #include "Core/Diffusion.h"
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace lighttransport
@@ -63,6 +64,10 @@ public:
     double leaked = 0.; ///< power through the rim
     /** How many voxels will be lit in the end, from how their number grew with the cost. */
     double expected = 0.;
+    /** Voxels at the rim and what would come back to them, a source: the error that the cut makes.
+     */
+    std::vector<std::pair<std::int64_t, double>> missing;
+    double beyond = 0.; ///< the Euclidean norm of what is cut off, relative to that of phi
   };
   /**
    * Takes the true costs from phi, solved for on spans() with 0 beyond, gives dark voxels up where

@@ -1504,6 +1504,38 @@ void DiffusionSolver::estimateError(
   report.estimatedError = static_cast<double>(ratio);
 }
 
+void DiffusionSolver::addCut(const std::vector<std::pair<std::int64_t, double>>& missing,
+  double beyond, const double* phi, DiffusionReport& report)
+{
+  double largest = 0.;
+  for (const auto& source : missing)
+  {
+    largest = std::max(largest, std::abs(source.second));
+  }
+  if (report.estimatedError < 0. || !(largest > 0.) || !this->multigridReady)
+  {
+    return;
+  }
+  // A e = what is missing; near the rim, where it shows, one cycle is as good as a solve
+  Buffer<float> b(this->box.size(), this->A.pages);
+  Buffer<float> e(this->box.size(), this->A.pages);
+  const std::array<int, 3>& n = this->volume.dims;
+  for (const auto& source : missing)
+  {
+    const std::int64_t row = source.first / n[0];
+    const std::int64_t i =
+      this->box.index(static_cast<int>(source.first - row * n[0]) - this->corner[0],
+        static_cast<int>(row % n[1]) - this->corner[1],
+        static_cast<int>(row / n[1]) - this->corner[2]);
+    b[i] = static_cast<float>(source.second / largest);
+  }
+  this->multigrid.cycle(b.data(), e.data(), this->parallelFor);
+  DiffusionReport cut;
+  this->estimateError(phi, e.data(), largest / this->scale, 1., cut);
+  report.estimatedError += cut.estimatedError;
+  report.estimatedErrorL2 += cut.estimatedErrorL2 + beyond;
+}
+
 //------------------------------------------------------------------------------
 bool DiffusionSolver::isZero(const double* phi) const
 {
@@ -2514,6 +2546,10 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
   {
     threshold = std::min(threshold, 1e-6 * std::sqrt(control.targetError));
   }
+  if (control.timeBudget > 0.)
+  {
+    threshold = std::min(threshold, 1e-7); // the estimate knows no voxel that is cut off
+  }
 
   double spent = 0.; // applications, in parts of the volume's
   int iterations = 0;
@@ -2700,8 +2736,17 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
             }
             return sum;
           });
-      return late || std::abs(report.leaked) <= MostLeaked * magnitude ? finish(fraction)
-                                                                       : wholeVolume();
+      if (!late && std::abs(report.leaked) > MostLeaked * magnitude)
+      {
+        return wholeVolume();
+      }
+      this->addCut(rim.missing, rim.beyond, field.data(), report);
+      if (!complete || region.grown())
+      {
+        report.estimatedError = std::max(1., report.estimatedError); // light had yet to get there
+      }
+      spent += (1. + 2. * this->multigrid.sweeps) * fraction;
+      return finish(fraction);
     }
     if (large || (!ended && most != next))
     {

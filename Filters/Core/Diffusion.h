@@ -191,7 +191,8 @@ public:
    * the sources, grown where more than `threshold` (of the largest |phi|) would stand beyond, with
    * phi = 0 there. Light that stays in a vessel then does not cost the whole volume; light that
    * fills more than control.largestRegion of it is solved on the whole. With a control.targetError
-   * e, at most 1e-6 sqrt(e) is cut off. phi is out only. The operator that is kept is the region's:
+   * e, at most 1e-6 sqrt(e) is cut off, with a timeBudget at most 1e-7; the estimated error holds
+   * what that costs. phi is out only. The operator that is kept is the region's:
    * setMedium before another kind of solve.
    */
   template <class T, class Q>
@@ -381,6 +382,12 @@ private:
    */
   void estimateError(
     const double* phi, const float* z, double scaled, double factor, DiffusionReport& report) const;
+  /**
+   * Adds the error of an active region's cut: of sources at its rim that are missing in phi, and
+   * what is `beyond`, relative to phi.
+   */
+  void addCut(const std::vector<std::pair<std::int64_t, double>>& missing, double beyond,
+    const double* phi, DiffusionReport& report);
 
   WatchedFor parallelFor;
   Grid volume;                              ///< the medium's

@@ -290,6 +290,119 @@ void open(Suite& suite)
   compare(suite, "corridors", scene, { 1., 1., 1e-4 });
 }
 
+/** The estimate holds what the cut costs, where the solve itself is nearly exact. */
+void cuts(Suite& suite)
+{
+  DiffusionScene scenes[] = { vessel({ { 64, 40, 40 } }, 3., 1e-3, 1e-4, 1.),
+    vessel({ { 64, 44, 44 } }, 4., 0., 1e-3, 1.), vessel({ { 64, 40, 40 } }, 3., 0.1, 0.1, 1.) };
+  for (DiffusionScene& scene : scenes)
+  {
+    light(scene, 26., 1.);
+    light(scene, 30., -0.4);
+    DiffusionScene full = scene;
+    full.solve(1e-12);
+    for (const double threshold : { 1e-7, 1e-8, 1e-9 })
+    {
+      DiffusionSolver solver;
+      DiffusionControl control;
+      control.tolerance = 1e-11;
+      control.timeBudget = 100.;
+      control.regionSearch = 10.;
+      control.largestRegion = 0.9;
+      const DiffusionReport report =
+        solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control, threshold);
+      const double error = Percentile95(scene.phi, full.phi);
+      const double l2 = relativeL2(scene.phi, full.phi);
+      std::cout << "cut at " << threshold << ": " << error << ", estimated "
+                << report.estimatedError << ", L2 " << l2 << ", estimated "
+                << report.estimatedErrorL2 << ", " << report.activeFraction << "\n";
+      LT_CHECK(suite, report.activeFraction < 1. && report.reason == StopReason::Converged);
+      LT_CHECK(
+        suite, report.estimatedError > error / 4. && report.estimatedError < 4. * error + 1e-10);
+      LT_CHECK(suite, report.estimatedErrorL2 > l2 / 2. && report.estimatedErrorL2 < 2. * l2);
+    }
+  }
+}
+
+void extremes(Suite& suite)
+{
+  {
+    // in walls: closed, and nearly so; and close to each other, of both signs
+    DiffusionScene scene = vessel({ { 48, 32, 32 } }, 3., 1e-2, 1e-4, 1.);
+    light(scene, 20., 1.);
+    const std::size_t closed = static_cast<std::size_t>(scene.grid.index(30, 3, 3));
+    scene.D[closed] = 0.;
+    scene.q[closed] = 0.5;
+    scene.q[static_cast<std::size_t>(scene.grid.index(12, 2, 2))] = 0.5;
+    compare(suite, "in walls", scene, { 0., 0.2 });
+    light(scene, 21., -1.);
+    light(scene, 23., -1e-4);
+    compare(suite, "both signs", scene, { 0., 0.2 });
+  }
+  {
+    // a vessel that the mask cuts
+    DiffusionScene scene = vessel({ { 48, 32, 32 } }, 3., 1e-2, 1e-4, 1.);
+    light(scene, 20., 1.);
+    std::vector<std::uint8_t> outside(scene.q.size(), 0);
+    for (int i = 36; i < 48; ++i)
+    {
+      for (int row = 0; row < 32 * 32; ++row)
+      {
+        outside[static_cast<std::size_t>(i + 48 * row)] = 1;
+      }
+    }
+    compare(suite, "masked", scene, { 0., 0.2 }, outside);
+  }
+  for (const Boundary boundary : { Boundary::Robin, Boundary::ZeroFlux, Boundary::Absorbing })
+  {
+    // nothing absorbs: light ends at the border, or nowhere
+    DiffusionScene scene = vessel({ { 40, 24, 24 } }, 3., 0., 1e-3, 0.);
+    scene.boundary = boundary;
+    light(scene, 20., 1.);
+    if (boundary != Boundary::ZeroFlux)
+    {
+      compare(suite, "no sink", scene, { 0., 1., 1e-2 });
+      continue;
+    }
+    DiffusionSolver solver;
+    const DiffusionReport report =
+      solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), DiffusionControl());
+    LT_CHECK(suite, report.reason == StopReason::NoSteadyState);
+  }
+  for (const double h : { 1e-3, 1e3 })
+  {
+    DiffusionScene scene = vessel({ { 40, 24, 24 } }, 3., 1e-2, 1e-4, 1.);
+    scene.grid.spacing = { { 1., 1., h } };
+    light(scene, 20., 1.);
+    compare(suite, "flat voxels", scene, { 0., 1., 1e-2, 0.9 });
+  }
+  // told to stop at each question in turn: never a wrong word, never a NaN
+  DiffusionScene scene = vessel({ { 64, 40, 40 } }, 3., 1e-3, 1e-4, 1.);
+  light(scene, 26., 1.);
+  DiffusionControl control;
+  control.regionSearch = 10.;
+  int cancelled = 0;
+  for (int last = 0; last < 200; ++last)
+  {
+    int asked = 0;
+    control.progress = [&](double) { return asked++ < last; };
+    DiffusionSolver solver;
+    const DiffusionReport report =
+      solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control);
+    LT_CHECK(suite,
+      std::all_of(scene.phi.begin(), scene.phi.end(), [](double v) { return std::isfinite(v); }));
+    LT_CHECK(
+      suite, report.reason == (asked > last ? StopReason::Cancelled : StopReason::Converged));
+    if (asked <= last)
+    {
+      break;
+    }
+    ++cancelled;
+  }
+  std::cout << "cancelled at each of " << cancelled << " questions\n";
+  LT_CHECK(suite, cancelled > 5 && cancelled < 100);
+}
+
 /** Walls, decades and spacings drawn at random: always the same answer as on the whole. */
 void anything(Suite& suite)
 {
@@ -386,6 +499,8 @@ int main(int argc, char* argv[])
   borders(suite);
   thin(suite);
   open(suite);
+  cuts(suite);
+  extremes(suite);
   anything(suite);
   control(suite);
   return suite.result();
