@@ -2745,7 +2745,7 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
       {
         report.estimatedError = std::max(1., report.estimatedError); // light had yet to get there
       }
-      spent += (1. + 2. * this->multigrid.sweeps) * fraction;
+      spent += report.estimatedError < 0. ? 0. : (1. + 2. * this->multigrid.sweeps) * fraction;
       return finish(fraction);
     }
     if (large || (!ended && most != next))

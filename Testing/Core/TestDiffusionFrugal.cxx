@@ -313,6 +313,7 @@ void threads(Suite& suite)
     if (active)
     {
       control.largestRegion = 1.;
+      control.regionSearch = 10.; // whether it pays or not
       return solver.solveActive(scene.medium(), scene.q.data(), phi.data(), control, 1e-3);
     }
     solver.setMedium(scene.medium());

@@ -469,8 +469,8 @@ void progress(Suite& suite)
 /** Only what the scene requires, through the filter. */
 void frugal(Suite& suite)
 {
-  // a rod of tissue in absorbing walls
-  auto image = makeImage(64, 40, 40, VTK_UNSIGNED_CHAR, [](int, int, int) { return 0.; });
+  // a rod of tissue in absorbing walls, so small a part that finding its region pays
+  auto image = makeImage(96, 64, 64, VTK_UNSIGNED_CHAR, [](int, int, int) { return 0.; });
   const auto inside = [](int j, int k) { return std::hypot(j - 20., k - 20.) < 3.; };
   addArray<vtkFloatArray>(
     image, "DiffusionCoefficient", [&](int, int j, int k) { return inside(j, k) ? 1. : 1e-4; });
@@ -524,7 +524,7 @@ void frugal(Suite& suite)
     void Execute(vtkObject* caller, unsigned long, void*) override
     {
       auto* shown = Filter::SafeDownCast(caller)->GetIntermediateOutput();
-      this->count += shown && shown->GetNumberOfPoints() == 64 * 40 * 40 &&
+      this->count += shown && shown->GetNumberOfPoints() == 96 * 64 * 64 &&
         shown->GetPointData()->GetArray("Fluence");
     }
     int count = 0;
