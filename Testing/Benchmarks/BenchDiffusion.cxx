@@ -469,7 +469,7 @@ double MeasureFloor(const Options& options)
     for (const int n : options.floorSizes)
     {
       sweeps.push_back({ n, {}, {} });
-      const Problem problem = MakeProblem(n, Recipes[0], parallelFor);
+      const Problem problem = MakeProblem(n, MakeVolume(n, parallelFor), Recipes[0], parallelFor);
       DiffusionSolver solver(parallelFor);
       solver.setMedium(problem.medium());
       Jacobi jacobi(problem, parallelFor);
@@ -635,9 +635,10 @@ void MeasureErrors(const Options& options)
     "| medium | knob | value | s | CPU s | iterations | residual | p95 | L2 | bytes / voxel |\n"
     "|---|---|---|---|---|---|---|---|---|---|\n",
     n, threads);
+  const std::vector<float> S = MakeVolume(n, parallelFor);
   for (const MediumRecipe& recipe : Recipes)
   {
-    const Problem problem = MakeProblem(n, recipe, parallelFor);
+    const Problem problem = MakeProblem(n, S, recipe, parallelFor);
     const Hypre hypre(options, problem);
     double reached = 0.;
     const std::vector<double> reference = ReferenceSolution(problem, reached, parallelFor);
@@ -960,6 +961,13 @@ bool MeasureSolves(const Options& options, double triad)
   const ParallelFor parallelFor = OnThreads(threads);
   for (const int n : options.sizes)
   {
+    if (options.limit > 0. && now() - options.began > options.limit)
+    {
+      std::printf("| %d³ | | | | 0 | not run: --limit was reached | | | | | | | | | | | | |\n", n);
+      continue;
+    }
+    say(options, std::to_string(n) + "³: making the volume");
+    const std::vector<float> S = MakeVolume(n, parallelFor);
     for (const int medium : options.media)
     {
       if (medium == 3 && n > 384)
@@ -967,7 +975,7 @@ bool MeasureSolves(const Options& options, double triad)
         continue;
       }
       const MediumRecipe recipe = medium == 3 ? MediumRecipe{ 0., 0. } : Recipes[medium - 1];
-      const Problem problem = MakeProblem(n, recipe, parallelFor);
+      const Problem problem = MakeProblem(n, S, recipe, parallelFor);
       const double voxels = static_cast<double>(problem.grid.size());
       const std::string title = std::to_string(n) + "³, " + problem.name;
       std::vector<double> reference;

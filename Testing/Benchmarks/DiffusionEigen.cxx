@@ -45,8 +45,9 @@ Run SolveEigen(const Problem& problem, double tolerance, std::vector<double>& ph
           diagonal += BorderSink(D, problem.boundary);
           continue;
         }
-        const double g = FaceConductance(
-          D, static_cast<double>(problem.D[static_cast<std::size_t>(i + side * stride[d])]));
+        const int next = i + side * stride[d];
+        const double g =
+          FaceConductance(D, static_cast<double>(problem.D[static_cast<std::size_t>(next)]));
         diagonal += g;
         above[d] = side > 0 ? g : above[d];
       }

@@ -70,6 +70,14 @@ struct Tube
 {
   int axis;
   double b, c, swing, turns, phase, radius, value;
+  std::vector<std::array<double, 2>> centre; ///< across, for each voxel along
+
+  std::array<double, 2> centreAt(double p) const
+  {
+    const double along = 6.283185307 * this->turns * p + this->phase;
+    return { { this->b + this->swing * std::sin(along),
+      this->c + this->swing * std::cos(1.3 * along) } };
+  }
 };
 
 struct Scene
@@ -107,6 +115,10 @@ struct Scene
       t.phase = random(0., 6.28);
       t.radius = std::max(random(.008, .03), 1.5 * this->voxel);
       t.value = random(150., 220.);
+      for (int j = 0; j < n; ++j)
+      {
+        t.centre.push_back(t.centreAt((j + 0.5) * this->voxel));
+      }
       this->tubes.push_back(t);
     }
   }
@@ -116,6 +128,7 @@ struct Scene
 
   double value(int i, int j, int k) const
   {
+    const int at[3] = { i, j, k };
     const double p[3] = { (i + 0.5) * this->voxel, (j + 0.5) * this->voxel,
       (k + 0.5) * this->voxel };
     const auto mix = [](double& to, double value, double weight) { to += weight * (value - to); };
@@ -135,9 +148,9 @@ struct Scene
     }
     for (const Tube& t : this->tubes)
     {
-      const double along = 6.283185307 * t.turns * p[t.axis] + t.phase;
-      const double u = p[(t.axis + 1) % 3] - t.b - t.swing * std::sin(along);
-      const double v = p[(t.axis + 2) % 3] - t.c - t.swing * std::cos(1.3 * along);
+      const std::array<double, 2>& centre = t.centre[static_cast<std::size_t>(at[t.axis])];
+      const double u = p[(t.axis + 1) % 3] - centre[0];
+      const double v = p[(t.axis + 2) % 3] - centre[1];
       mix(s, t.value, this->inside(t.radius - std::sqrt(u * u + v * v)));
     }
     s += 5. * valueNoise(24. * p[0], 24. * p[1], 24. * p[2], 1) +
@@ -157,7 +170,28 @@ DiffusionMedium<float> Problem::medium() const
   return m;
 }
 
-Problem MakeProblem(int n, const MediumRecipe& recipe, const ParallelFor& parallelFor)
+std::vector<float> MakeVolume(int n, const ParallelFor& parallelFor)
+{
+  std::vector<float> S(
+    static_cast<std::size_t>(n) * static_cast<std::size_t>(n) * static_cast<std::size_t>(n));
+  const Scene scene(n);
+  parallelFor(static_cast<std::int64_t>(n) * n,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t r = begin; r < end; ++r)
+      {
+        for (int i = 0; i < n; ++i)
+        {
+          S[static_cast<std::size_t>(r * n + i)] =
+            static_cast<float>(scene.value(i, static_cast<int>(r % n), static_cast<int>(r / n)));
+        }
+      }
+    });
+  return S;
+}
+
+Problem MakeProblem(
+  int n, const std::vector<float>& S, const MediumRecipe& recipe, const ParallelFor& parallelFor)
 {
   Problem p;
   p.grid.dims = { { n, n, n } };
@@ -180,20 +214,6 @@ Problem MakeProblem(int n, const MediumRecipe& recipe, const ParallelFor& parall
     std::lround(std::log10(recipe.contrast)), recipe.albedo);
   p.name = text;
 
-  std::vector<float> S(count);
-  const Scene scene(n);
-  parallelFor(static_cast<std::int64_t>(n) * n,
-    [&](std::int64_t begin, std::int64_t end)
-    {
-      for (std::int64_t r = begin; r < end; ++r)
-      {
-        for (int i = 0; i < n; ++i)
-        {
-          S[static_cast<std::size_t>(r * n + i)] =
-            static_cast<float>(scene.value(i, static_cast<int>(r % n), static_cast<int>(r / n)));
-        }
-      }
-    });
   const ValueReader read = [&S](std::int64_t begin, std::int64_t m, double* values)
   { std::copy(S.begin() + begin, S.begin() + begin + m, values); };
   p.D.resize(count);

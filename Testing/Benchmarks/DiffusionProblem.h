@@ -42,13 +42,19 @@ struct MediumRecipe
 };
 
 /**
- * D = exp(-(|grad S| / sigma)^2), at least 1 / contrast, of a procedural volume S:
- * a body with blobs of tissue and vessels, texture, and white noise in every
- * voxel; sigma_a = (1 - albedo) / (3 D). One voxel of open tissue emits. The
- * shapes scale with the size n, while edges and noise keep their widths in
- * voxels, as in images of finer resolution. Constant: D = 1 with a border of 0.
+ * A procedural volume of n^3 voxels: a body with blobs of tissue and vessels, texture, and white
+ * noise in every voxel. The shapes scale with n, while edges and noise keep their widths in
+ * voxels, as in images of finer resolution.
  */
-Problem MakeProblem(int n, const MediumRecipe& recipe, const ParallelFor& parallelFor);
+std::vector<float> MakeVolume(int n, const ParallelFor& parallelFor);
+
+/**
+ * D = exp(-(|grad S| / sigma)^2), at least 1 / contrast, of the volume S;
+ * sigma_a = (1 - albedo) / (3 D). One voxel of open tissue emits.
+ * Constant: D = 1 with a border of 0, and no need of S.
+ */
+Problem MakeProblem(
+  int n, const std::vector<float>& S, const MediumRecipe& recipe, const ParallelFor& parallelFor);
 
 /** The face between two voxels' D, spacing 1. */
 inline double FaceConductance(double a, double b)
