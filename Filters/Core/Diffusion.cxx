@@ -1267,8 +1267,9 @@ double DiffusionSolver::face(int d, std::int64_t i) const
 
 void DiffusionSolver::forgetFaces()
 {
-  // active regions, walls and time steps keep them
-  if (this->A.isStored() && this->A.spans.empty() && !this->anyWall && this->shift == 0.)
+  // active regions, walls, time steps and grounded voxels keep them
+  if (this->A.isStored() && this->A.spans.empty() && !this->anyWall && this->shift == 0. &&
+    !this->grounded)
   {
     this->A.forget(
       [this](std::int64_t row, float* const g[3], float* s)
@@ -2331,23 +2332,22 @@ void DiffusionSolver::steady(
     }
     else
     {
-      const auto grounded = this->ground(singular, closed);
+      const auto before = this->ground(singular, closed);
+      this->grounded = !before.empty();
       const auto restore = [&]
       {
-        for (const auto& voxel : grounded)
+        for (const auto& voxel : before)
         {
-          if (this->A.isStored())
-          {
-            this->A.s[voxel.first] = voxel.second;
-          }
+          this->A.s[voxel.first] = voxel.second;
           this->multigridReady = false;
         }
+        this->grounded = false;
       };
       try
       {
         this->conjugateGradients(b, phi, control, 0., 1., report);
       }
-      catch (const Interrupted&)
+      catch (...)
       {
         restore();
         throw;

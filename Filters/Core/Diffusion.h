@@ -413,6 +413,7 @@ private:
   bool anySink = false;
   bool everySink = false;
   bool anyWall = false;
+  bool grounded = false; ///< sinks stand in A that the medium does not have
   /** Conductance through the border, divided by scale: [axis][low, high], a value per face. */
   std::array<std::array<std::vector<float>, 2>, 3> border;
   double shift = 0.;
