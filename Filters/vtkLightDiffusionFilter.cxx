@@ -937,6 +937,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   this->UsedTimeStep = this->Mode == Steady || local ? 0.
     : this->TimeStep > 0.                            ? this->TimeStep
                                                      : this->CourantNumber * bound;
+  bool previewed = false; // as the least that can be done
   // What does for a named error or within a budget, in this order.
   const auto choose = [&](const auto* q) -> DiffusionReport
   {
@@ -998,6 +999,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       }
       setupSeconds += before.seconds;
       this->UsedCoarseningFactor = 4;
+      previewed = true;
       control.timeBudget = timeLeft();
       return preview.solve(q, phi.data(), control, false);
     }
@@ -1136,6 +1138,24 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
          << " iterations";
     problem = report.message.empty() ? text.str() : report.message;
     return false;
+  }
+  if (this->StopReason == Converged && this->TargetError > 0. &&
+    this->EstimatedError > this->TargetError)
+  {
+    text << (this->Message.empty() ? "" : "; ")
+         << "the tolerance ended the solve before the named error was reached";
+    this->Message += text.str();
+    text.str("");
+  }
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
+  if (this->TimeBudget > 0. &&
+    spent.count() > this->TimeBudget + std::max(0.1 * this->TimeBudget, 0.01))
+  {
+    text << (this->Message.empty() ? "" : "; ") << "the time budget is "
+         << (previewed ? "below the floor: the least that is done took " : "overrun: it took ")
+         << spent.count() << " s instead of " << this->TimeBudget;
+    this->Message += text.str();
+    text.str("");
   }
   const bool stepsDone = this->Mode != Steady && this->StopReason == MaxIterations &&
     (this->Mode == Explicit || report.message.empty());

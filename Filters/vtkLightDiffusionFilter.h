@@ -324,9 +324,12 @@ public:
    * Seconds after which a steady solve gives its best answer, chosen as with TargetError, with an
    * estimate of its error; the stop reason is then MaxIterations. >= 0; default 0: no limit. It
    * counts from the start of the execution, output included. Where it is too short for the full
-   * grid's set-up (128^3: some 0.1 s), cells of four points without corrections serve as a preview:
-   * GetUsedCoarseningFactor is 4, the estimate is 1, a guess, and GetMessage says so. The preview
-   * is the least that is done, some 20 ns per point on the two cores of measured.md.
+   * grid's set-up (128^3: some 0.1 s), cells of four points serve as a preview:
+   * GetUsedCoarseningFactor is 4. Where there is no time for a correction by the full grid's
+   * equations, the estimate is 1, a guess, and GetMessage says so. The preview is the least that is
+   * done, some 20 ns per point on the two cores of measured.md: GetMessage says where that floor,
+   * or a step that cannot be cut short, took more than a tenth, and 10 ms, beyond the budget.
+   * With TargetError too, what comes first ends the solve.
    */
   vtkSetMacro(TimeBudget, double);
   vtkGetMacro(TimeBudget, double);

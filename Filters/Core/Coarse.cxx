@@ -1273,7 +1273,10 @@ void CoarseDiffusion::correct(
   double shown = began;
   double lastRate = 0.;
   bool shrinking = true;
-  for (int i = 0; whole && !this->hasty && i < (named ? most : fixed); ++i)
+  bool told = false;
+  // In haste a first correction takes as long as what was done before it, and some passes.
+  const double first = now() - began + 3. * pass;
+  for (int i = 0; whole && i < (named ? most : fixed) && (i > 0 || inTime(first)); ++i)
   {
     const double start = now();
     if (control.progress && !control.progress(static_cast<double>(i + 1) / (most + 1)))
@@ -1317,6 +1320,7 @@ void CoarseDiffusion::correct(
     const double rateP95 =
       std::max({ rate(change.p95, last.p95), 0.8 * rateL2, i > 1 ? 0.7 * lastRate : 0. });
     lastRate = std::min(rateP95, 0.7);
+    told = true;
     report.estimatedError = 1.1 * change.p95 * rateP95 / std::max(0.1, 1. - rateP95);
     report.estimatedErrorL2 = 1.1 * change.l2 * rateL2 / std::max(0.1, 1. - rateL2);
     shrinking = i < 2 || change.p95 < 0.7 * last.p95 || change.l2 < 0.7 * last.l2;
@@ -1335,7 +1339,7 @@ void CoarseDiffusion::correct(
       shown = now();
     }
   }
-  if (whole && this->hasty)
+  if (whole && this->hasty && !told)
   {
     // What cells of several voxels leave without a correction is of the order of the field.
     report.estimatedError = report.estimatedErrorL2 = 1.;

@@ -38,9 +38,9 @@ public:
   /**
    * factor: 1 .. 8 voxels of the finest axis per cell; 1 is the full grid itself. The medium's
    * arrays must outlive the solves. Answers BadInput as DiffusionSolver::setMedium does.
-   * In haste, psi is told from each voxel alone, and solve makes no corrections, and no sweeps for
+   * In haste, psi is told from each voxel alone, and solve makes no sweeps and no corrections for
    * which control.timeBudget is too short: a third of the time of the least that is done otherwise,
-   * for a field that may be wrong by its own order. Its estimated error is 1, a guess.
+   * for a field that may be wrong by its own order. Its estimated error is then 1, a guess.
    */
   template <class T>
   DiffusionReport setMedium(const DiffusionMedium<T>& medium, int factor, bool inHaste = false,

@@ -1414,8 +1414,8 @@ double DiffusionSolver::residual(
 }
 
 //------------------------------------------------------------------------------
-void DiffusionSolver::estimateError(
-  const double* phi, const float* z, double scaled, double factor, DiffusionReport& report) const
+void DiffusionSolver::estimateError(const double* phi, const float* z, double scaled, double factor,
+  int sign, DiffusionReport& report) const
 {
   const DiffusionOperator& op = this->A;
   struct Row
@@ -1473,10 +1473,20 @@ void DiffusionSolver::estimateError(
       for (std::int64_t i = from; i < to; ++i)
       {
         const double error = step * static_cast<double>(z[i]);
-        const double value = std::abs(phi[i] + error);
-        if (value >= 1e-6 * total.largest && value > 0.)
+        double before = phi[i];
+        double value = before + error;
+        double least = std::abs(value);
+        if (sign != 0)
         {
-          const float ratio = static_cast<float>(std::min(std::abs(error) / value, 1e30));
+          // What has the wrong sign becomes 0. Light that comes or goes at once is hardly any.
+          before = std::max(0., sign * before);
+          value = std::max(0., sign * value);
+          least = std::min(before, value);
+        }
+        if (least >= 1e-6 * total.largest && least > 0.)
+        {
+          const float ratio =
+            static_cast<float>(std::min(std::abs((value - before) / value), 1e30));
           std::uint32_t bits;
           std::memcpy(&bits, &ratio, sizeof(bits));
           bins.push_back(bits >> shift);
@@ -1492,6 +1502,11 @@ void DiffusionSolver::estimateError(
   for (const std::int64_t count : counts)
   {
     all += count;
+  }
+  if (all == 0)
+  {
+    report.estimatedError = total.values > 0. ? 1. : 0.;
+    return;
   }
   std::int64_t above = 0;
   std::size_t bin = counts.size();
@@ -1532,7 +1547,7 @@ void DiffusionSolver::addCut(const std::vector<std::pair<std::int64_t, double>>&
   }
   this->multigrid.cycle(b.data(), e.data(), this->parallelFor);
   DiffusionReport cut;
-  this->estimateError(phi, e.data(), largest / this->scale, 1., cut);
+  this->estimateError(phi, e.data(), largest / this->scale, 1., 0, cut);
   report.estimatedError += cut.estimatedError;
   report.estimatedErrorL2 += cut.estimatedErrorL2 + beyond;
 }
@@ -1594,6 +1609,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   }
   report.residual = rNorm / bNorm;
   const bool named = control.targetError > 0. || control.timeBudget > 0.;
+  const int sign = named ? this->signOf(b) : 0;
   if (rNorm <= goal && !named) // else the first cycle tells the error
   {
     report.reason = StopReason::Converged;
@@ -1723,7 +1739,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     const double rzOfPhi = rz * rScale * rScale;
     if (named)
     {
-      this->estimateError(phi, z.data(), rScale, slow.factor(rzOfPhi), report);
+      this->estimateError(phi, z.data(), rScale, slow.factor(rzOfPhi), sign, report);
       rEstimated = rNorm;
       if (rNorm <= goal) // where it started
       {
@@ -1956,7 +1972,7 @@ void DiffusionSolver::solveConstant(
       ForRows(this->parallelFor, size, size,
         [&](std::int64_t begin, std::int64_t end)
         { std::copy(x.data() + begin, x.data() + end, z.data() + begin); });
-      this->estimateError(phi, z.data(), 1., 1., report);
+      this->estimateError(phi, z.data(), 1., 1., 0, report);
       if (rNorm <= goal)
       {
         report.reason = StopReason::Converged;
@@ -2883,20 +2899,46 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
 
 //------------------------------------------------------------------------------
 template <class T>
+int DiffusionSolver::signOf(const RightHandSide<T>& b) const
+{
+  if (b.mean != 0. || !b.q)
+  {
+    return 0;
+  }
+  const std::int64_t all = this->rows();
+  std::vector<std::uint8_t> signs(static_cast<std::size_t>(all), 0); // 1: above 0, 2: below
+  ForEachRow(this->A, this->parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    {
+      std::uint8_t one = 0;
+      for (std::int64_t i = o; i < o + n; ++i)
+      {
+        one = static_cast<std::uint8_t>(one | (b.q[i] > T(0) ? 1 : 0) | (b.q[i] < T(0) ? 2 : 0));
+      }
+      signs[static_cast<std::size_t>(row)] = one;
+    });
+  int any = 0;
+  for (const std::uint8_t one : signs)
+  {
+    any |= one;
+  }
+  return any == 1 ? 1 : any == 2 ? -1 : 0;
+}
+
+template <class T>
 void DiffusionSolver::keepSign(
   const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
 {
   // Where the matrix ties voxels weakly, a small residual says little of their signs.
-  if (report.reason == StopReason::Cancelled || report.reason == StopReason::NotFinite ||
-    b.mean != 0.)
+  if (report.reason == StopReason::Cancelled || report.reason == StopReason::NotFinite)
   {
     return;
   }
-  for (int again = 0;; ++again)
+  const int sign = this->signOf(b);
+  for (int again = 0; sign != 0; ++again)
   {
     struct Signs
     {
-      bool above = false, below = false; // sources
       double least = 0., most = 0.;
     };
     std::vector<Signs> rowSigns(static_cast<std::size_t>(this->rows()));
@@ -2906,8 +2948,6 @@ void DiffusionSolver::keepSign(
         Signs& signs = rowSigns[static_cast<std::size_t>(row)];
         for (std::int64_t i = o; i < o + n; ++i)
         {
-          signs.above = signs.above || b.q[i] > T(0);
-          signs.below = signs.below || b.q[i] < T(0);
           signs.least = std::min(signs.least, phi[i]);
           signs.most = std::max(signs.most, phi[i]);
         }
@@ -2915,15 +2955,13 @@ void DiffusionSolver::keepSign(
     Signs all;
     for (const Signs& signs : rowSigns)
     {
-      all.above = all.above || signs.above;
-      all.below = all.below || signs.below;
       all.least = std::min(all.least, signs.least);
       all.most = std::max(all.most, signs.most);
     }
     const double allowed = std::min(control.tolerance, Unseen);
     const bool kept =
-      all.above ? -all.least <= allowed * all.most : all.most <= allowed * -all.least;
-    if (all.above == all.below || kept)
+      sign > 0 ? -all.least <= allowed * all.most : all.most <= allowed * -all.least;
+    if (kept)
     {
       return;
     }
@@ -2932,7 +2970,7 @@ void DiffusionSolver::keepSign(
       {
         for (std::int64_t i = o; i < o + n; ++i)
         {
-          phi[i] = all.above ? std::max(phi[i], 0.) : std::min(phi[i], 0.);
+          phi[i] = sign > 0 ? std::max(phi[i], 0.) : std::min(phi[i], 0.);
         }
       });
     if (report.reason != StopReason::Converged || control.targetError > 0. || again == 3)

@@ -311,6 +311,9 @@ private:
   template <class T>
   void solveConstant(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
     DiffusionReport& report);
+  /** 1 or -1 where all sources are of that sign, and so is the exact answer; else 0. */
+  template <class T>
+  int signOf(const RightHandSide<T>& b) const;
   /**
    * Where all sources are of one sign, so is the exact answer: what is of the other one beyond
    * the tolerance or 1e-7 (of the largest |phi|) becomes 0, and the solve goes on from there,
@@ -378,10 +381,10 @@ private:
 
   /**
    * 95th percentile and L2 norm of the error, were it `scaled` z times `factor` in L2, and times
-   * its root in the percentile.
+   * its root in the percentile; sign: the exact answer's, or 0.
    */
-  void estimateError(
-    const double* phi, const float* z, double scaled, double factor, DiffusionReport& report) const;
+  void estimateError(const double* phi, const float* z, double scaled, double factor, int sign,
+    DiffusionReport& report) const;
   /**
    * Adds the error of an active region's cut: of sources at its rim that are missing in phi, and
    * what is `beyond`, relative to phi.

@@ -627,6 +627,75 @@ void coarser(Suite& suite)
   LT_CHECK_CLOSE(suite, fluenceAt(coarse, 30, 15, 18), fluenceAt(full, 30, 15, 18), 1e-5);
 }
 
+/** Errors and budgets that no one should name, and both at once. */
+void namedExtremes(Suite& suite)
+{
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  auto image = scene(16, 1., 1e-3, 7, 8, 9, 1.);
+  // not constant, which is solved at once
+  addArray<vtkFloatArray>(image, "DiffusionCoefficient",
+    [](int i, int j, int k) { return (i + j * k) % 3 == 0 ? 1e-3 : 1.; });
+  vtkNew<Filter> exact;
+  exact->SetInputData(image);
+  exact->SetTolerance(1e-12);
+  exact->SetOutputPrecision(vtkAlgorithm::DOUBLE_PRECISION);
+  exact->Update();
+  vtkNew<Filter> filter;
+  filter->SetInputData(image);
+  for (const double bad : { nan, inf, -inf, -1e-3, 1., 10. })
+  {
+    filter->SetTargetError(bad);
+    LT_CHECK_FAILS(suite, filter.Get(), "TargetError is", "expected");
+  }
+  filter->SetTargetError(0.);
+  for (const double bad : { nan, inf, -inf, -1e-3 })
+  {
+    filter->SetTimeBudget(bad);
+    LT_CHECK_FAILS(suite, filter.Get(), "TimeBudget is", "expected");
+  }
+  // error, budget, whether an error is told
+  struct Named
+  {
+    double error, budget;
+    bool told;
+  };
+  for (const Named& named :
+    { Named{ 0., 0., false }, Named{ 0.99, 0., true }, Named{ 1e-3, 0., true },
+      Named{ 1e-12, 0., true }, Named{ 1e-300, 0., true }, Named{ 0., 1e9, true },
+      Named{ 1e-3, 1e9, true }, Named{ 1e-3, 1e-9, true }, Named{ 1e-12, 1e-300, true } })
+  {
+    vtkNew<Filter> one;
+    vtkNew<MessageLog> warnings;
+    one->AddObserver(vtkCommand::WarningEvent, warnings);
+    one->SetInputData(image);
+    one->SetTargetError(named.error);
+    one->SetTimeBudget(named.budget);
+    one->SetOutputPrecision(vtkAlgorithm::DEFAULT_PRECISION);
+    one->Update();
+    const bool hurried = named.budget > 0. && named.budget < 1.;
+    LT_CHECK(suite, one->GetStopReason() == (hurried ? Filter::MaxIterations : Filter::Converged));
+    LT_CHECK(suite, warnings->messages.empty());
+    LT_CHECK(suite, (one->GetEstimatedError() >= 0.) == named.told);
+    LT_CHECK(suite, (one->GetEstimatedErrorL2() >= 0.) == named.told);
+    const bool small = named.error > 0. && named.error < 1e-6;
+    LT_CHECK(suite, pointArray(one, "Fluence")->GetDataType() == (small ? VTK_DOUBLE : VTK_FLOAT));
+    // 1e-8 of the residual, where nothing ends it earlier
+    const double most = hurried ? 1. : std::max(named.error, 1e-5);
+    for (const int i : { 3, 7, 12 })
+    {
+      const double truth = fluenceAt(exact, i, 8, 8);
+      const double told = fluenceAt(one, i, 8, 8);
+      LT_CHECK(suite, std::isfinite(told) && told >= 0. && std::abs(told - truth) <= most * truth);
+    }
+    // what was not reached is said
+    const std::string message = one->GetMessage();
+    const bool missed = !hurried && named.error > 0. && one->GetEstimatedError() > named.error;
+    LT_CHECK(suite, missed == (message.find("named error") != std::string::npos));
+    LT_CHECK(suite, hurried == (message.find("time budget") != std::string::npos));
+  }
+}
+
 /** Switching, dimming and turning the sign of a light is a sum, not a solve. */
 void superposition(Suite& suite)
 {
@@ -820,6 +889,7 @@ int main(int argc, char* argv[])
   progress(suite);
   frugal(suite);
   coarser(suite);
+  namedExtremes(suite);
   superposition(suite);
   badInput(suite);
   return suite.result();
