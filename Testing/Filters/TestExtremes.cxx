@@ -115,6 +115,27 @@ void media(Suite& suite)
       p.expect(suite, ("albedo " + std::to_string(albedo) + ", g " + std::to_string(g)).c_str());
     }
   }
+  // hardly any absorption between mirrors: fluence is power / (sigma_a V), nearly everywhere
+  for (const double g : { -0.999, 0., 0.999 })
+  {
+    Pipeline p;
+    p.lamp(1.);
+    p.medium->SetAbsorptionMapping(vtkOpticalMediumFilter::FromAlbedo);
+    p.medium->SetAlbedo(1. - 1e-7);
+    p.medium->SetAnisotropy(g);
+    p.light->SetBoundary(Filter::ZeroFlux);
+    p.expect(suite, ("albedo 1 - 1e-7, mirrors, g " + std::to_string(g)).c_str());
+    vtkDataArray* sigma_a = pointArray(p.medium, "Absorption");
+    double sum = 0.;
+    for (vtkIdType i = 0; i < sigma_a->GetNumberOfTuples(); ++i)
+    {
+      sum += sigma_a->GetComponent(i, 0);
+    }
+    double range[2];
+    pointArray(p.light, "Fluence")->GetRange(range);
+    LT_CHECK(suite, range[0] * sum <= 1. + 1e-5 && range[1] * sum >= 1. - 1e-5);
+    LT_CHECK(suite, g > 0.5 || range[0] * sum > 0.9);
+  }
   for (const int boundary : { Filter::Robin, Filter::ZeroFlux, Filter::Absorbing })
   {
     Pipeline p;
