@@ -224,6 +224,64 @@ void rightHandSideRow(int n, const double* q, double scale, double mean, const f
   rightHandSide(n, q, scale, mean, a, b, previous, to);
 }
 
+/** The sum of value(i), i < n, in eight strands. */
+template <class Value>
+LIGHTTRANSPORT_INLINE double inStrands(std::int64_t n, const Value& value)
+{
+  double sums[8] = { 0., 0., 0., 0., 0., 0., 0., 0. };
+  std::int64_t i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      sums[l] += value(i + l);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    sums[0] += value(i);
+  }
+  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+/** The sum of (scale q - mean)^2 */
+template <class T>
+LIGHTTRANSPORT_INLINE double squaresOf(int n, const T* q, double scale, double mean)
+{
+  return inStrands(n,
+    [=](std::int64_t i)
+    {
+      const double v = scale * static_cast<double>(q[i]) - mean;
+      return v * v;
+    });
+}
+LIGHTTRANSPORT_SIMD
+double squaresRow(int n, const float* q, double scale, double mean)
+{
+  return squaresOf(n, q, scale, mean);
+}
+LIGHTTRANSPORT_SIMD
+double squaresRow(int n, const double* q, double scale, double mean)
+{
+  return squaresOf(n, q, scale, mean);
+}
+/** The sum of a, or of a b where b is given. */
+template <class T>
+LIGHTTRANSPORT_INLINE double totalOf(int n, const T* a, const double* b)
+{
+  return b ? inStrands(n, [=](std::int64_t i) { return static_cast<double>(a[i]) * b[i]; })
+           : inStrands(n, [=](std::int64_t i) { return static_cast<double>(a[i]); });
+}
+LIGHTTRANSPORT_SIMD
+double totalRow(int n, const float* a, const double* b)
+{
+  return totalOf(n, a, b);
+}
+LIGHTTRANSPORT_SIMD
+double totalRow(int n, const double* a, const double* b)
+{
+  return totalOf(n, a, b);
+}
+
 /** to = (b - y) factor, returns the sum of squares of b - y; to may be null. */
 LIGHTTRANSPORT_SIMD
 double subtract(int n, const double* LIGHTTRANSPORT_RESTRICT b,
@@ -474,7 +532,7 @@ LIGHTTRANSPORT_INLINE double largestOf(std::int64_t n, const T* LIGHTTRANSPORT_R
     const T value = a[i];
     Bits bits;
     std::memcpy(&bits, &value, sizeof(T));
-    bits = bits == minusZero ? 0 : bits;
+    bits &= static_cast<Bits>(0) - static_cast<Bits>(bits != minusZero); // no branch: vectors
     most = bits > most ? bits : most; // what is not finite or below 0 is above the greatest
   }
   T largest;
@@ -1301,6 +1359,10 @@ double DiffusionSolver::norm(const RightHandSide<T>& b) const
   return std::sqrt(SumEachRow(this->A, this->parallelFor,
     [&](std::int64_t, std::int64_t o, int n)
     {
+      if (b.q && !b.previous)
+      {
+        return squaresRow(n, b.q + o, b.qScale, b.mean);
+      }
       static thread_local std::vector<double> store;
       store.assign(2 * static_cast<std::size_t>(n), 0.);
       b.row(o, n, store.data());
@@ -2044,8 +2106,13 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
 {
   const double V = this->box.voxelVolume();
   const auto sum = [this](const auto& term) { return this->sumOf(term); };
+  const auto total = [this](const auto* a, const double* b)
+  {
+    return SumEachRow(this->A, this->parallelFor,
+      [&](std::int64_t, std::int64_t o, int n) { return totalRow(n, a + o, b ? b + o : nullptr); });
+  };
   // an active region holds all sources
-  report.emitted = !q ? 0. : V * sum([&](std::int64_t i) { return static_cast<double>(q[i]); });
+  report.emitted = !q ? 0. : V * total(q, nullptr);
   // from the medium itself, as the residual
   const auto weigh = [&](const auto& medium)
   {
@@ -2054,11 +2121,14 @@ void DiffusionSolver::balance(const T* q, const double* phi, DiffusionReport& re
       return;
     }
     const auto inside = [&](std::int64_t i) { return !(medium.outside && medium.outside[i]); };
-    report.absorbed = V *
-      sum(
-        [&](std::int64_t i) {
-          return medium.sigma_a && inside(i) ? static_cast<double>(medium.sigma_a[i]) * phi[i] : 0.;
-        });
+    if (medium.sigma_a)
+    {
+      report.absorbed = V *
+        (medium.outside
+            ? sum([&](std::int64_t i)
+                { return inside(i) ? static_cast<double>(medium.sigma_a[i]) * phi[i] : 0.; })
+            : total(medium.sigma_a, phi));
+    }
     double escaped = 0.;
     const std::array<int, 3>& n = this->box.dims;
     for (int d = 0; d < 3; ++d)

@@ -474,28 +474,46 @@ void energyAcross(int n, const float* LIGHTTRANSPORT_RESTRICT g,
   }
 }
 
-/** The energy of a row's weights on the faces along it, from voxel 0 on. */
+/** The energy of a row's weights on the faces along it, where no voxels are joined along it. */
 LIGHTTRANSPORT_SIMD
-void energyAlong(int n, bool halved, const float* LIGHTTRANSPORT_RESTRICT g,
-  const float* LIGHTTRANSPORT_RESTRICT a, const float* LIGHTTRANSPORT_RESTRICT b,
-  float* LIGHTTRANSPORT_RESTRICT own, float* LIGHTTRANSPORT_RESTRICT next)
+void energyAlong(int n, const float* LIGHTTRANSPORT_RESTRICT g,
+  const float* LIGHTTRANSPORT_RESTRICT a, float* LIGHTTRANSPORT_RESTRICT own)
 {
-  if (!halved)
+  for (int i = 0; i < n; ++i)
   {
-    for (int i = 0; i < n; ++i)
-    {
-      own[i] += (g[i] + g[i - 1]) * a[i] * a[i];
-    }
-    return;
+    own[i] += (g[i] + g[i - 1]) * a[i] * a[i];
   }
+}
+
+/**
+ * The energy of a row's weights on the faces after its voxels, of all three axes, and on its sinks.
+ * N and T: the rows beyond along y and z. Along x voxels are joined in pairs.
+ */
+LIGHTTRANSPORT_SIMD
+void energyRow(int n, const float* LIGHTTRANSPORT_RESTRICT gx,
+  const float* LIGHTTRANSPORT_RESTRICT gy, const float* LIGHTTRANSPORT_RESTRICT gz,
+  const float* LIGHTTRANSPORT_RESTRICT s, const float* LIGHTTRANSPORT_RESTRICT a,
+  const float* LIGHTTRANSPORT_RESTRICT b, const float* LIGHTTRANSPORT_RESTRICT aN,
+  const float* LIGHTTRANSPORT_RESTRICT bN, const float* LIGHTTRANSPORT_RESTRICT aT,
+  const float* LIGHTTRANSPORT_RESTRICT bT, float* LIGHTTRANSPORT_RESTRICT own,
+  float* LIGHTTRANSPORT_RESTRICT next)
+{
   for (int i = 0; i < n; ++i)
   {
     // the face above an odd voxel lies between columns, the one above an even voxel inside one
     const float odd = static_cast<float>(i & 1);
-    const float above = a[i] - (odd * b[i + 1] + (1.f - odd) * a[i + 1]);
-    const float below = (1.f - odd) * (b[i - 1] - a[i]);
-    own[i] += g[i] * above * above + g[i - 1] * below * below;
-    next[i] += (odd * g[i - 1] + (1.f - odd) * g[i]) * b[i] * b[i];
+    const float ai = a[i];
+    const float bi = b[i];
+    const float above = ai - (odd * b[i + 1] + (1.f - odd) * a[i + 1]);
+    const float below = (1.f - odd) * (b[i - 1] - ai);
+    const float yOwn = ai - aN[i];
+    const float yNext = bi - bN[i];
+    const float zOwn = ai - aT[i];
+    const float zNext = bi - bT[i];
+    own[i] += gx[i] * above * above + gx[i - 1] * below * below + s[i] * ai * ai +
+      gy[i] * yOwn * yOwn + gz[i] * zOwn * zOwn;
+    next[i] += (odd * gx[i - 1] + (1.f - odd) * gx[i] + s[i]) * bi * bi + gy[i] * yNext * yNext +
+      gz[i] * zNext * zNext;
   }
 }
 
@@ -1438,9 +1456,16 @@ void Multigrid::raise(const DiffusionOperator& A, const Level& fine, const Slab&
       const std::int64_t f = static_cast<std::int64_t>(n[0]) * j + plane * k;
       const float* a = weights(jj, kk, 0);
       const float* b = weights(jj, kk, 1);
+      if (jj > 0 && kk > 0 && fine.halved[0])
+      {
+        energyRow(n[0], slab.g(0, f), slab.g(1, f), slab.g(2, f), slab.s(f), a, b,
+          weights(jj + 1, kk, 0), weights(jj + 1, kk, 1), weights(jj, kk + 1, 0),
+          weights(jj, kk + 1, 1), own, next);
+        continue;
+      }
       if (jj > 0 && kk > 0)
       {
-        energyAlong(n[0], fine.halved[0], slab.g(0, f), a, b, own, next);
+        energyAlong(n[0], slab.g(0, f), a, own);
         energyAcross(n[0], slab.s(f), a, b, zeros, zeros, own, next);
       }
       if (kk > 0)
