@@ -231,6 +231,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(vtkDat
   const std::int64_t size = grid.size();
   parallel.whole()(
     size, [phi](std::int64_t begin, std::int64_t end) { std::fill(phi + begin, phi + end, 0.); });
+  Showing show(control);
   int used = 0;
   for (vtkIdType s = 0; s < spheres->GetNumberOfTuples() && used < most; ++s)
   {
@@ -263,6 +264,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(vtkDat
       DiffusionControl own = control;
       own.tolerance = 0.3 * control.tolerance;
       own.targetError = own.timeBudget = 0.; // a part of many sums to come
+      own.intermediate = nullptr;
       const DiffusionReport report = this->solver.solveSteady(q.data(), one.phi.data(), own);
       all.iterations += report.iterations;
       all.seconds += report.seconds;
@@ -289,6 +291,7 @@ lighttransport::DiffusionReport vtkLightDiffusionFilter::State::superpose(vtkDat
         }
       });
     parallel.poll();
+    show(phi);
   }
   while (static_cast<int>(this->solutions.size()) > most)
   {

@@ -1270,7 +1270,7 @@ void CoarseDiffusion::correct(
   const double enough = control.targetError > 0. ? 0.7 * control.targetError : 1e-6;
   Change last;
   double spent = 0.; // by a correction
-  double shown = began;
+  Showing show(control);
   double lastRate = 0.;
   bool shrinking = true;
   bool told = false;
@@ -1333,11 +1333,7 @@ void CoarseDiffusion::correct(
     {
       break;
     }
-    if (control.intermediate && now() - shown >= control.intermediateInterval)
-    {
-      control.intermediate(phi);
-      shown = now();
-    }
+    show(phi);
   }
   if (whole && this->hasty && !told)
   {

@@ -660,6 +660,34 @@ const char* ToString(StopReason reason)
   return "Unknown";
 }
 
+//------------------------------------------------------------------------------
+Showing::Showing(const DiffusionControl& how)
+  : control(how)
+  , last(this->now())
+{
+}
+
+double Showing::now() const
+{
+  return this->control.clock ? this->control.clock() : lighttransport::now();
+}
+
+bool Showing::isDue() const
+{
+  return this->control.intermediate &&
+    this->now() - this->last >= this->control.intermediateInterval;
+}
+
+void Showing::operator()(const double* phi)
+{
+  if (this->isDue())
+  {
+    this->control.intermediate(phi);
+    this->last = this->now();
+  }
+}
+
+//------------------------------------------------------------------------------
 double DiffuseFresnelReflectance(double eta)
 {
   if (eta == 1.)
@@ -1718,7 +1746,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   bool restart = false;
   bool fresh = true;
   std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()), 0.);
-  double seen = began;
+  Showing show(control);
   SlowError slow;
   double lastEstimate = began;
   double rEstimated = 0.; // the residual's norm when the error was estimated
@@ -1939,11 +1967,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     const double fraction =
       progressBegin + (progressEnd - progressBegin) * std::min(1., std::max(0., done));
     this->parallelFor.tell(fraction);
-    if (control.intermediate && now() - seen >= control.intermediateInterval)
-    {
-      control.intermediate(phi);
-      seen = now();
-    }
+    show(phi);
     if (control.progress && !control.progress(fraction))
     {
       throw Interrupted();
@@ -2607,6 +2631,7 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
   const DiffusionControl& control, double threshold)
 {
   const double began = now();
+  Showing show(control);
   DiffusionReport report = this->check(medium);
   if (report.reason != StopReason::Converged)
   {
@@ -2759,11 +2784,14 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
     DiffusionControl how = complete || late ? remaining() : rough;
     if (control.intermediate)
     {
-      how.intermediateInterval = control.intermediateInterval;
+      how.intermediateInterval = 0.;
       how.intermediate = [&](const double* reached)
       {
-        publish(reached);
-        control.intermediate(phi);
+        if (show.isDue())
+        {
+          publish(reached);
+          show(phi);
+        }
       };
     }
     report = this->solveSteady(source.data(), field.data(), how);
@@ -2883,6 +2911,8 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
   const std::int64_t solves = static_cast<std::int64_t>(stages) * steps;
   DiffusionControl sharper = control;
   sharper.targetError = sharper.timeBudget = 0.; // of a steady answer, not of a step
+  sharper.intermediate = nullptr;
+  Showing show(control);
   for (std::int64_t solve = 0; solve < solves; ++solve)
   {
     const double ahead = solve % stages == 0 ? 1. : (1. - gamma) / gamma;
@@ -2932,6 +2962,7 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
     {
       continue;
     }
+    show(phi);
     // b - A phi of the steady equation is shift (phi - previous), up to this solve's tolerance
     const double change = shifted *
       std::sqrt(SumRows(this->parallelFor, this->rows(), size,
@@ -3169,7 +3200,7 @@ DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* 
       report.bytes =
         this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
       const double step = local ? length : length * this->scale;
-      double seen = now();
+      Showing show(control);
       // What does not fit the cache goes several steps in one pass over the memory. Nobody is asked
       // between these; where somebody is there to be asked they must not last.
       const bool several =
@@ -3239,11 +3270,7 @@ DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* 
           report.reason = StopReason::Converged;
           break;
         }
-        if (control.intermediate && now() - seen >= control.intermediateInterval)
-        {
-          control.intermediate(fields[at]);
-          seen = now();
-        }
+        show(fields[at]);
         const double fraction = static_cast<double>(report.iterations) / static_cast<double>(steps);
         this->parallelFor.tell(fraction);
         if (control.progress && !control.progress(fraction))

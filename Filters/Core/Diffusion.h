@@ -148,9 +148,27 @@ struct DiffusionControl
    * knows another way.
    */
   bool regionOrNothing = false;
-  /** Called with the field reached, after an iteration, at most once per interval (seconds). */
+  /**
+   * Called with the field reached: after the first iteration, step or correction that ends so many
+   * seconds or more after the solve began, or after the last call returned.
+   */
   std::function<void(const double* phi)> intermediate;
   double intermediateInterval = 0.1;
+  std::function<double()> clock; ///< seconds, of the interval; empty: the system's steady clock
+};
+
+/** Calls control.intermediate when it is due. */
+class Showing
+{
+public:
+  explicit Showing(const DiffusionControl& control);
+  bool isDue() const;
+  void operator()(const double* phi);
+
+private:
+  double now() const;
+  const DiffusionControl& control;
+  double last = 0.;
 };
 
 /**

@@ -569,7 +569,6 @@ template <class T>
 void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
   const DiffusionControl& control, FirstMomentReport& report)
 {
-  const double began = now();
   // The margin is rounding's: the bound itself is allowed.
   constexpr double margin = 1. + 1e-6;
   const bool positive = std::isfinite(length) && length > 0.;
@@ -618,7 +617,7 @@ void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
   this->weighAbsorption(length);
   report.bytes = this->bytes() + size * static_cast<std::int64_t>(sizeof(double));
   report.reason = StopReason::MaxIterations;
-  double seen = began;
+  Showing show(control);
   for (int i = 0; i < steps; ++i)
   {
     // E goes from where it is to half a step after phi, phi from there half a step further.
@@ -646,11 +645,7 @@ void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
       report.reason = StopReason::Converged;
       break;
     }
-    if (control.intermediate && now() - seen >= control.intermediateInterval)
-    {
-      control.intermediate(phi);
-      seen = now();
-    }
+    show(phi);
     const double fraction = static_cast<double>(i + 1) / steps;
     this->parallelFor.tell(fraction);
     if (control.progress && !control.progress(fraction))

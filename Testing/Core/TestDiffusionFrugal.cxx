@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
 /** Only what the scene requires: active regions, named errors, budgets, cancelling. */
+#include "Core/FirstMoment.h"
 #include "Core/SlowError.h"
 #include "DiffusionScene.h"
 #include "LightTransportTesting.h"
@@ -279,6 +280,110 @@ void slowComponents(Suite& suite)
   }
 }
 
+/**
+ * Fields on the way: at the rate of the rule, by a clock of the test's own; finite and nearer to
+ * the answer from one to the next; and after a cancel the one that was shown last.
+ */
+void intermediate(Suite& suite)
+{
+  // 40 steps of a second each: step k is judged when k - 1 seconds are told
+  DiffusionScene scene({ { 12, 10, 9 } }, { { 1., 1., 1. } });
+  scene.sigma_a.assign(scene.q.size(), 1e-2);
+  scene.D[7] = 0.5;
+  scene.q[200] = 1.;
+  DiffusionSolver solver;
+  FirstMomentSolver moment;
+  solver.setMedium(scene.medium());
+  moment.setMedium(scene.medium());
+  constexpr int steps = 40;
+  const double bound = solver.positivityBound();
+  for (const double interval : { 0., 1., 3., 5., 12.5, 39., 40. })
+  {
+    for (int kind = 0; kind < 4; ++kind)
+    {
+      DiffusionControl control;
+      control.tolerance = 1e-13;
+      double seconds = 0.;
+      int shown = 0;
+      control.progress = [&](double fraction)
+      {
+        // implicit steps tell parts of a step as well; its last part comes after it was shown
+        seconds = std::floor(steps * fraction + 1e-9);
+        return true;
+      };
+      control.clock = [&] { return seconds; };
+      control.intermediateInterval = interval;
+      control.intermediate = [&](const double* phi) { shown += phi[200] > 0. ? 1 : 0; };
+      std::vector<double> phi(scene.phi.size(), 0.);
+      const DiffusionReport report = kind == 0
+        ? solver.stepExplicit(scene.q.data(), phi.data(), steps, bound, control)
+        : kind == 1 ? solver.stepLocal(scene.q.data(), phi.data(), steps, 1., control)
+        : kind == 2 ? solver.stepImplicit(scene.q.data(), phi.data(), steps, bound, control)
+                    : static_cast<DiffusionReport>(moment.step(
+                        scene.q.data(), phi.data(), steps, moment.courantBound(), control));
+      LT_CHECK(suite, report.reason == StopReason::MaxIterations);
+      const int expected =
+        interval == 0. ? steps : static_cast<int>((steps - 1) / std::ceil(interval));
+      suite.check(shown == expected,
+        "kind " + std::to_string(kind) + ", every " + std::to_string(interval) +
+          " s: " + std::to_string(shown) + " of " + std::to_string(expected),
+        __FILE__, __LINE__);
+    }
+  }
+
+  // steady: each is nearer to the answer
+  DiffusionScene hard = tube(40, 1e-5);
+  DiffusionSolver steady;
+  steady.setMedium(hard.medium());
+  DiffusionControl exactly;
+  exactly.tolerance = 1e-13;
+  std::vector<double> answer(hard.phi.size(), 0.);
+  steady.solveSteady(hard.q.data(), answer.data(), exactly);
+  std::vector<double> errors;
+  DiffusionControl control;
+  control.intermediateInterval = 0.;
+  std::vector<double> shown;
+  bool finite = true;
+  std::size_t stopAt = 0;
+  bool stop = false;
+  control.intermediate = [&](const double* phi)
+  {
+    shown.assign(phi, phi + answer.size());
+    double wrong = 0.;
+    double all = 0.;
+    for (std::size_t i = 0; i < answer.size(); ++i)
+    {
+      finite = finite && std::isfinite(phi[i]);
+      wrong += (phi[i] - answer[i]) * (phi[i] - answer[i]);
+      all += answer[i] * answer[i];
+    }
+    errors.push_back(std::sqrt(wrong / all));
+    stop = errors.size() == stopAt;
+  };
+  control.progress = [&](double) { return !stop; };
+  const DiffusionReport report = steady.solveSteady(hard.q.data(), hard.phi.data(), control);
+  LT_CHECK(suite, report.reason == StopReason::Converged && finite && errors.size() >= 4);
+  for (std::size_t i = 1; i < errors.size(); ++i)
+  {
+    LT_CHECK(suite, errors[i] < errors[i - 1]);
+  }
+  std::cout << "shown after each iteration: L2 error " << errors.front() << " to " << errors.back()
+            << "\n";
+  for (const std::size_t at : { std::size_t(1), std::size_t(3) })
+  {
+    errors.clear();
+    stopAt = at;
+    hard.phi.assign(hard.phi.size(), 0.);
+    const DiffusionReport cancelled = steady.solveSteady(hard.q.data(), hard.phi.data(), control);
+    stop = false;
+    LT_CHECK(suite, cancelled.reason == StopReason::Cancelled);
+    LT_CHECK(suite, cancelled.iterations == static_cast<int>(at));
+    LT_CHECK(suite, hard.phi == shown);
+    LT_CHECK(suite, !cancelled.message.empty());
+    LT_CHECK_CLOSE(suite, cancelled.residual, hard.residual(), 0.02);
+  }
+}
+
 void budget(Suite& suite)
 {
   DiffusionScene scene = tube(48, 1e-6);
@@ -352,6 +457,7 @@ int main(int argc, char* argv[])
   targetError(suite);
   signs(suite);
   slowComponents(suite);
+  intermediate(suite);
   budget(suite);
   return suite.result();
 }
