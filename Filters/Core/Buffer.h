@@ -30,7 +30,7 @@ enum class Pages
  * what is touched is rounded up to 2 MiB. A system that must make them first, by moving what lies
  * in the way or by getting them back from its host, takes ten times as long as with small pages;
  * so one page in 8 MiB is touched here and now, and if that takes long, the rest are small, as
- * are those asked for in the next ten seconds.
+ * are those asked for in the next second.
  */
 inline void PreferLargePages(void* memory, std::size_t bytes)
 {
@@ -38,7 +38,7 @@ inline void PreferLargePages(void* memory, std::size_t bytes)
   using Clock = std::chrono::steady_clock;
   static std::atomic<Clock::rep> notBefore{ std::numeric_limits<Clock::rep>::min() };
   constexpr auto slow = std::chrono::microseconds(600); // zeros for a page: 100 to 200
-  constexpr auto pause = std::chrono::seconds(10);
+  constexpr auto pause = std::chrono::seconds(1);
   constexpr std::uintptr_t page = std::uintptr_t(1) << 21;
   constexpr std::uintptr_t piece = 4 * page;
   const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(memory);
