@@ -75,7 +75,7 @@ struct Options
   int most = 96;
   int repeat = 5;
   int threads = 2;
-  bool errors = true; // of section region: they take an exact solve
+  bool errors = true;                 // of section region: they take an exact solve
   int seed = 0;                       // of random scenes; 0: the fixed ones
   std::vector<int> sizes{ 128, 256 }; // of `cancel`
   int moments = -1;                   // of `cancel`; 120, 70 or 12, by the size
