@@ -716,6 +716,8 @@ struct Entry
 {
   std::string solver;
   int threads;
+  /** Seconds at 128^3, as long as no smaller size has told. */
+  double guess;
   /** By which power of the size the time grows: 4 where iterations do too. */
   double power;
   /** phi holds the solution if the run says so by a true `judge`. */
@@ -871,9 +873,9 @@ std::vector<Entry> MakeEntries(
   const int most = options.most();
   const int n = problem.grid.dims[0];
   std::vector<Entry> entries;
-  const auto add = [&entries](const char* solver, int threads, double power,
+  const auto add = [&entries](const char* solver, int threads, double guess, double power,
                      std::function<Run(std::vector<double>&, bool)> solve) {
-    entries.push_back({ solver, threads, power, std::move(solve), 1, "", {} });
+    entries.push_back({ solver, threads, guess, power, std::move(solve), 1, "", {} });
   };
   for (const int t : options.threads)
   {
@@ -881,32 +883,32 @@ std::vector<Entry> MakeEntries(
     {
       continue;
     }
-    add(Ours, t, 3.,
+    add(Ours, t, .5, 3.,
       [&problem, tolerance, t](std::vector<double>& phi, bool)
       { return SolveOursTwice(problem, tolerance, t, phi); });
     if (Hypre::available() && !problem.constant)
     {
-      add(Theirs, t, 3.,
+      add(Theirs, t, 2., 3.,
         [&hypre, tolerance, t](std::vector<double>& phi, bool judge)
         { return hypre->solve("pfmg", tolerance, t, judge ? &phi : nullptr); });
     }
   }
   if (Hypre::available() && !problem.constant)
   {
-    add("hypre PCG+BoomerAMG", most, 3.,
+    add("hypre PCG+BoomerAMG", most, 3., 3.,
       [&hypre, tolerance, most](std::vector<double>& phi, bool judge)
       { return hypre->solve("boomeramg", tolerance, most, judge ? &phi : nullptr); });
   }
   if (problem.constant)
   {
-    add("lighttransport, iterating", most, 3.,
+    add("lighttransport, iterating", most, .3, 3.,
       [&problem, tolerance, most](std::vector<double>& phi, bool)
       { return SolveOurs(problem, tolerance, most, phi, true); });
   }
 #ifdef BENCH_WITH_EIGEN
   if (!problem.constant)
   {
-    add("Eigen CG+IC", 1, 4.,
+    add("Eigen CG+IC", 1, 5., 4.,
       [&problem, tolerance](std::vector<double>& phi, bool)
       { return SolveEigen(problem, tolerance, phi); });
   }
@@ -914,14 +916,14 @@ std::vector<Entry> MakeEntries(
 #ifdef BENCH_WITH_OPENVDB
   if (problem.constant)
   {
-    add("OpenVDB poisson", most, 4.,
+    add("OpenVDB poisson", most, 3., 4.,
       [&problem, tolerance, most](std::vector<double>& phi, bool)
       { return SolveOpenVDB(problem, tolerance, most, phi); });
   }
 #endif
   if (n <= 128 && !problem.constant) // what it shows is its error
   {
-    add("200 Jacobi sweeps", most, 3.,
+    add("200 Jacobi sweeps", most, .3, 3.,
       [&problem, most](std::vector<double>& phi, bool) { return SolveJacobi(problem, most, phi); });
   }
   return entries;
@@ -996,7 +998,8 @@ bool MeasureSolves(const Options& options, double triad)
       const auto expected = [&](const Entry& entry)
       {
         const Cost& cost = costOf(entry);
-        return cost.size ? cost.seconds * std::pow(1. * n / cost.size, entry.power) : 0.;
+        return cost.size ? cost.seconds * std::pow(1. * n / cost.size, entry.power)
+                         : entry.guess * std::pow(n / 128., entry.power);
       };
       for (Entry& entry : entries)
       {
