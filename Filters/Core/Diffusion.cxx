@@ -1565,15 +1565,13 @@ void DiffusionSolver::estimateError(const double* phi, const float* z, double sc
         const double error = step * static_cast<double>(z[i]);
         double before = phi[i];
         double value = before + error;
-        double least = std::abs(value);
         if (sign != 0)
         {
-          // What has the wrong sign becomes 0. Light that comes or goes at once is hardly any.
+          // what has the wrong sign becomes 0
           before = std::max(0., sign * before);
           value = std::max(0., sign * value);
-          least = std::min(before, value);
         }
-        if (least >= 1e-6 * total.largest && least > 0.)
+        if (std::abs(value) >= 1e-6 * total.largest && value != 0.)
         {
           const float ratio =
             static_cast<float>(std::min(std::abs((value - before) / value), 1e30));
