@@ -955,9 +955,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       lighttransport::DiffusionControl own = control;
       own.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
       own.regionOrNothing = true;
-      // the cost of finding out goes with it, the gain against it
-      own.largestRegion =
-        this->TimeBudget > 0. ? std::min(0.125, 0.125 * perPoint / 300e-9) : 0.125;
+      own.largestRegion = 0.125;
       before = withMedium([&](const auto& medium)
         { return regional.solveActive(medium, q, phi.data(), own, this->ActiveThreshold); });
       using lighttransport::StopReason;
