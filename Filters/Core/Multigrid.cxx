@@ -1732,7 +1732,27 @@ void Multigrid::cycle(
 {
   const DiffusionOperator& A = this->operatorOf(l);
   Level& fine = this->levels[l];
-  Level* coarse = l + 1 < this->levels.size() ? &this->levels[l + 1] : nullptr;
+  if (l + 1 == this->levels.size())
+  {
+    SmoothAround(A, this->sweeps, b, x, nullptr, parallelFor, done);
+    return;
+  }
+  Level& coarse = this->levels[l + 1];
+  ForEachRow(coarse.A, parallelFor,
+    [&](std::int64_t, std::int64_t o, int n)
+    { std::fill(coarse.b.data() + o, coarse.b.data() + o + n, 0.f); });
+  CoarseCorrection correction;
+  correction.restrictRow = [&](std::int64_t row, float* r, std::size_t pitch)
+  { this->restrictRow(A, fine, coarse, row, r, pitch); };
+  correction.solve = [&] { this->solveCoarse(l + 1, parallelFor); };
+  correction.prolongRow = [&](std::int64_t row, float* to)
+  { this->prolongRow(A, fine, coarse, row, to); };
+  SmoothAround(A, this->sweeps, b, x, &correction, parallelFor, done);
+}
+
+void SmoothAround(const DiffusionOperator& A, int sweeps, const float* b, float* x,
+  const CoarseCorrection* correction, const ParallelFor& parallelFor, const RowBody& done)
+{
   const auto relax = [&](std::int64_t row, int colour, const RowFaces& faces)
   {
     const Span span = A.span(row);
@@ -1741,15 +1761,9 @@ void Multigrid::cycle(
     relaxRow(span.end - span.begin, parityOf(A, row, o, colour), faces, viewRow(A, x, row, o),
       b + o, scratch(1, static_cast<std::size_t>(A.dims[0]), pitch), x + o);
   };
-  const int half = 2 * this->sweeps;
+  const int half = 2 * sweeps;
   // 4. smooth: red then black; 3. restrict what is left
-  if (coarse)
-  {
-    ForEachRow(coarse->A, parallelFor,
-      [&](std::int64_t, std::int64_t o, int n)
-      { std::fill(coarse->b.data() + o, coarse->b.data() + o + n, 0.f); });
-  }
-  skew(A, coarse ? half + 1 : half, parallelFor,
+  skew(A, correction ? half + 1 : half, parallelFor,
     [&](int stage, std::int64_t row, const RowFaces& faces)
     {
       const Span span = A.span(row);
@@ -1768,22 +1782,22 @@ void Multigrid::cycle(
         std::size_t pitch = 0;
         float* r = scratch(9, static_cast<std::size_t>(A.dims[0]), pitch);
         residualRow(n, faces, viewRow(A, x, row, o), b + o, r + span.begin);
-        this->restrictRow(A, fine, *coarse, row, r, pitch);
+        correction->restrictRow(row, r, pitch);
       }
     });
-  if (coarse)
+  if (correction)
   {
-    this->solveCoarse(l + 1, parallelFor);
+    correction->solve();
   }
   // 3. correct; 4. smooth: black then red
-  const int shift = coarse ? 1 : 0;
+  const int shift = correction ? 1 : 0;
   const int stages = half + shift;
   skew(A, stages, parallelFor,
     [&](int stage, std::int64_t row, const RowFaces& faces)
     {
       if (stage < shift)
       {
-        this->prolongRow(A, fine, *coarse, row, x);
+        correction->prolongRow(row, x);
         return;
       }
       relax(row, (stage - shift + 1) & 1, faces);

@@ -164,6 +164,26 @@ struct MultigridLine
   int odd;
 };
 
+/** What stands between the smoothing before and after it: the correction on a coarser grid. */
+struct CoarseCorrection
+{
+  /**
+   * Takes in the residual of a row: r is 0 but on red voxels, i + j + k even, of the row's span,
+   * and the first of nine rows with that pitch, the others for work.
+   */
+  std::function<void(std::int64_t row, float* r, std::size_t pitch)> restrictRow;
+  std::function<void()> solve;
+  /** Adds the correction to a row's red voxels; black ones are relaxed next, whatever they are. */
+  std::function<void(std::int64_t row, float* x)> prolongRow;
+};
+
+/**
+ * x ~ A^-1 b from zero: `sweeps` red-black sweeps of Gauss-Seidel, the correction, as many
+ * black-red ones. The rows that two threads restrict at a time are six or more rows apart.
+ */
+void SmoothAround(const DiffusionOperator& A, int sweeps, const float* b, float* x,
+  const CoarseCorrection* correction, const ParallelFor& parallelFor, const RowBody& done);
+
 class Multigrid
 {
 public:
