@@ -5,6 +5,7 @@
 #include "Core/ActiveRegion.h"
 #include "Core/Kernel.h"
 #include "Core/SlowError.h"
+#include "Core/Stall.h"
 
 #include <algorithm>
 #include <atomic>
@@ -57,6 +58,16 @@ constexpr double Unseen = 1e-7;
 
 /** From this tolerance on, memory counts more than the last few per cent of speed. */
 constexpr double FrugalTolerance = 1e-4;
+
+/**
+ * With more iterations left than this, the set-up of the aggregation (as long as some ten) and its
+ * own iterations (ten to fifteen) are fewer.
+ */
+constexpr double ManyIterations = 24.;
+
+/** Of the aggregation: so much in all is allowed, per voxel; and so much however few they are. */
+constexpr std::int64_t AllowedBytes = 64;
+constexpr std::int64_t AllowedAnyhow = std::int64_t(1) << 24;
 
 double now()
 {
@@ -729,8 +740,8 @@ std::int64_t DiffusionSolver::rows() const
 
 std::int64_t DiffusionSolver::bytesHeld() const
 {
-  return this->A.bytes() + this->multigrid.bytes() + this->sinkWithoutShift.bytes() +
-    this->constant.bytes();
+  return this->A.bytes() + this->multigrid.bytes() + this->aggregation.bytes() +
+    this->sinkWithoutShift.bytes() + this->constant.bytes();
 }
 
 //------------------------------------------------------------------------------
@@ -795,8 +806,7 @@ DiffusionReport DiffusionSolver::check(const DiffusionMedium<T>& medium)
   this->corner = { { 0, 0, 0 } };
   this->shift = 0.;
   this->sinkWithoutShift.release();
-  this->multigrid.release();
-  this->multigridReady = false;
+  this->dropHierarchies();
   this->isConstant = false;
   this->constant.release();
 
@@ -1018,8 +1028,7 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
   // 2. the operator
   if (anew)
   {
-    this->multigrid.release();
-    this->multigridReady = false;
+    this->dropHierarchies();
   }
   const bool whole = spans.empty();
   this->A.allocate(n, whole ? Pages::Large : Pages::Small);
@@ -1159,8 +1168,7 @@ void DiffusionSolver::assemble(const DiffusionMedium<T>& medium, std::vector<Spa
 
 void DiffusionSolver::setOperator(const Grid& grid, DiffusionOperator&& op, double operatorScale)
 {
-  this->multigrid.release();
-  this->multigridReady = false;
+  this->dropHierarchies();
   this->isConstant = false;
   this->shift = 0.;
   this->sinkWithoutShift.release();
@@ -1236,7 +1244,7 @@ void DiffusionSolver::setShift(double value)
     std::swap(this->A.s, this->sinkWithoutShift);
     this->sinkWithoutShift.release();
     this->shift = 0.;
-    this->multigridReady = false;
+    this->dropHierarchies();
   }
   if (value != 0.)
   {
@@ -1255,17 +1263,64 @@ void DiffusionSolver::setShift(double value)
     this->sinkWithoutShift = std::move(this->A.s);
     this->A.s = std::move(shifted);
     this->shift = value;
-    this->multigridReady = false;
+    this->dropHierarchies();
   }
 }
 
 void DiffusionSolver::prepareMultigrid(const ParallelFor& loop)
 {
-  if (!this->multigridReady)
+  if (!this->multigridReady && this->aggregation.empty())
   {
     this->multigrid.setup(this->A, loop);
     this->multigridReady = true;
   }
+}
+
+bool DiffusionSolver::aggregate(std::int64_t vectors, std::int64_t& bytes)
+{
+  this->mayAggregate = false; // is not tried again
+  const bool stored = this->A.isStored();
+  try
+  {
+    this->storeFaces();
+    const std::int64_t held = this->bytesHeld() + vectors;
+    const bool made = this->aggregation.setup(this->A,
+      std::max(AllowedBytes * this->A.activeSize - held, AllowedAnyhow), this->parallelFor);
+    bytes = held + this->aggregation.bytes();
+    if (!stored)
+    {
+      this->forgetFaces();
+    }
+    if (made)
+    {
+      this->multigrid.release();
+      this->multigridReady = false;
+    }
+    return made;
+  }
+  catch (const std::bad_alloc&)
+  {
+    this->aggregation.release();
+    if (!stored)
+    {
+      this->forgetFaces();
+    }
+    return false;
+  }
+  catch (const Interrupted&)
+  {
+    this->aggregation.release(); // half of it
+    this->mayAggregate = true;
+    throw;
+  }
+}
+
+void DiffusionSolver::dropHierarchies()
+{
+  this->multigrid.release();
+  this->multigridReady = false;
+  this->aggregation.release();
+  this->mayAggregate = true;
 }
 
 void DiffusionSolver::storeFaces()
@@ -1616,7 +1671,8 @@ void DiffusionSolver::addCut(const std::vector<std::pair<std::int64_t, double>>&
   {
     largest = std::max(largest, std::abs(source.second));
   }
-  if (report.estimatedError < 0. || !(largest > 0.) || !this->multigridReady)
+  if (report.estimatedError < 0. || !(largest > 0.) ||
+    (!this->multigridReady && this->aggregation.empty()))
   {
     return;
   }
@@ -1633,7 +1689,14 @@ void DiffusionSolver::addCut(const std::vector<std::pair<std::int64_t, double>>&
         static_cast<int>(row / n[1]) - this->corner[2]);
     b[i] = static_cast<float>(source.second / largest);
   }
-  this->multigrid.cycle(b.data(), e.data(), this->parallelFor);
+  if (this->aggregation.empty())
+  {
+    this->multigrid.cycle(b.data(), e.data(), this->parallelFor);
+  }
+  else
+  {
+    this->aggregation.cycle(this->A, b.data(), e.data(), this->parallelFor, nullptr);
+  }
   DiffusionReport cut;
   this->estimateError(phi, e.data(), largest / this->scale, 1., 0, cut);
   report.estimatedError += cut.estimatedError;
@@ -1746,6 +1809,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   std::vector<double> partial(2 * static_cast<std::size_t>(this->rows()), 0.);
   Showing show(control);
   SlowError slow;
+  Stall stall;
   double lastEstimate = began;
   double rEstimated = 0.; // the residual's norm when the error was estimated
   // The estimate is of the iterate before: no better than by what the residual has shrunk.
@@ -1778,10 +1842,43 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
       finish(StopReason::MaxIterations);
       return;
     }
+    // Where the multigrid does not see what is slow, the other way takes over: a new beginning for
+    // the iteration, and for what it tells of the error.
+    if (this->mayAggregate)
+    {
+      double misses = rNorm / std::max(goal, 1e-14 * bNorm); // double's end
+      if (control.targetError > 0. && report.estimatedError >= 0.)
+      {
+        misses = std::min(misses, report.estimatedError / (0.5 * control.targetError));
+      }
+      stall.add(std::max(misses, 1.));
+      // within a budget only where there is time for it
+      const double spent = now() - began;
+      const bool inTime = !(control.timeBudget > 0.) ||
+        control.timeBudget - spent > ManyIterations * spent / (iteration + 1);
+      if (stall.iterationsLeft() > ManyIterations && inTime)
+      {
+        std::int64_t bytes = 0;
+        if (this->aggregate(op.activeSize * (frugal ? 20 : 24), bytes))
+        {
+          restart = true;
+          slow = SlowError();
+          least = std::numeric_limits<double>::infinity();
+        }
+        report.bytes = std::max(report.bytes, bytes);
+      }
+    }
     // 1. z = B r, and z . r and z . Ap of its rows as they come
-    this->multigrid.cycle(r.data(), z.data(), loop,
-      [&](std::int64_t row, std::int64_t o, int n)
-      { twoDots(n, z.data() + o, r.data() + o, Ap.data() + o, partial.data() + 2 * row); });
+    const RowBody dots = [&](std::int64_t row, std::int64_t o, int n)
+    { twoDots(n, z.data() + o, r.data() + o, Ap.data() + o, partial.data() + 2 * row); };
+    if (this->aggregation.empty())
+    {
+      this->multigrid.cycle(r.data(), z.data(), loop, dots);
+    }
+    else
+    {
+      this->aggregation.cycle(op, r.data(), z.data(), loop, dots);
+    }
     report.fineApplications += 1. + 2. * this->multigrid.sweeps;
     // 2. p = z + beta p, beta = z . (r - r_old) / (r_old . z_old): the flexible form,
     //    since a cycle in float is not quite linear
@@ -2334,7 +2431,7 @@ std::vector<std::pair<std::int64_t, float>> DiffusionSolver::ground(
     sinkAt(*std::max_element(part.begin(), part.end(),
       [&](std::int64_t a, std::int64_t b) { return faces(a) < faces(b); }));
   }
-  this->multigridReady = false;
+  this->dropHierarchies();
   return before;
 }
 
@@ -2447,7 +2544,7 @@ void DiffusionSolver::steady(
         for (const auto& voxel : before)
         {
           this->A.s[voxel.first] = voxel.second;
-          this->multigridReady = false;
+          this->dropHierarchies();
         }
         this->grounded = false;
       };

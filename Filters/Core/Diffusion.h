@@ -18,6 +18,7 @@
 #ifndef LightTransport_Core_Diffusion_h
 #define LightTransport_Core_Diffusion_h
 
+#include "Core/Aggregation.h"
 #include "Core/ConstantMedium.h"
 #include "Core/Grid.h"
 #include "Core/Multigrid.h"
@@ -392,6 +393,12 @@ private:
   /** Adds a constant to all sinks (1 / (c dt) of an implicit step); 0 takes it away. */
   void setShift(double shift);
   void prepareMultigrid(const ParallelFor& loop);
+  /**
+   * Puts the aggregation in the multigrid's place; false where there is no memory for it. vectors:
+   * what is held besides; bytes: what was held in all.
+   */
+  bool aggregate(std::int64_t vectors, std::int64_t& bytes);
+  void dropHierarchies();
   std::int64_t bytesHeld() const;
   std::int64_t rows() const;
   void boundaryOf(Boundary boundary);
@@ -441,6 +448,8 @@ private:
   Buffer<float> sinkWithoutShift; // while shift is not 0
   Multigrid multigrid;
   bool multigridReady = false;
+  Aggregation aggregation; ///< in its place where it has been seen to stall, else empty
+  bool mayAggregate = true;
   bool isConstant = false; ///< D > 0 and sigma_a are the same everywhere, and it pays
   ConstantMedium constant;
 };
