@@ -1844,7 +1844,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     }
     // Where the multigrid does not see what is slow, the other way takes over: a new beginning for
     // the iteration, and for what it tells of the error.
-    if (this->mayAggregate)
+    if (this->mayAggregate && control.aggregation)
     {
       double misses = rNorm / std::max(goal, 1e-14 * bNorm); // double's end
       if (control.targetError > 0. && report.estimatedError >= 0.)

@@ -155,6 +155,8 @@ struct DiffusionControl
    */
   std::function<void(const double* phi)> intermediate;
   double intermediateInterval = 0.1;
+  /** Whether aggregation may take over where the multigrid stalls; false to compare. */
+  bool aggregation = true;
   std::function<double()> clock; ///< seconds, of the interval; empty: the system's steady clock
 };
 
