@@ -402,7 +402,7 @@ void whatTheThreads(Suite& suite)
 void region(Suite& suite)
 {
   const Hard maze = labyrinth(33, 1e-6);
-  Hard hard("region", { { 70, 60, 50 } }, { { 1., 1., 1. } });
+  Hard hard("region", { { 100, 90, 80 } }, { { 1., 1., 1. } });
   hard.scene.D.assign(hard.scene.q.size(), 1e-6);
   hard.scene.sigma_a.assign(hard.scene.q.size(), 0.1);
   for (int k = 0; k < 3; ++k)
@@ -413,7 +413,7 @@ void region(Suite& suite)
       {
         const std::size_t from = static_cast<std::size_t>(maze.scene.grid.index(i, j, k));
         const std::size_t to =
-          static_cast<std::size_t>(hard.scene.grid.index(i + 20, j + 10, k + 25));
+          static_cast<std::size_t>(hard.scene.grid.index(i + 30, j + 20, k + 40));
         hard.scene.D[to] = maze.scene.D[from];
         hard.scene.sigma_a[to] = maze.scene.D[from] < 1. ? 0.1 : 1e-4;
         hard.scene.q[to] = maze.scene.q[from];
@@ -508,9 +508,10 @@ void refused(Suite& suite)
   rlimit before;
   getrlimit(RLIMIT_AS, &before);
   int calls = 0;
-  control.progress = [&](double)
+  control.intermediateInterval = 0.;
+  control.intermediate = [&](const double*) // the first hierarchy is there
   {
-    if (++calls == 6)
+    if (++calls == 2)
     {
       long pages = 0;
       std::ifstream("/proc/self/statm") >> pages;
@@ -518,7 +519,6 @@ void refused(Suite& suite)
       limit.rlim_cur = static_cast<rlim_t>(pages * sysconf(_SC_PAGESIZE)) + (1 << 20);
       setrlimit(RLIMIT_AS, &limit);
     }
-    return true;
   };
   const DiffusionReport report =
     solver.solveSteady(hard.scene.q.data(), hard.scene.phi.data(), control);
