@@ -276,7 +276,8 @@ bool ActiveRegion<T>::fills(double largest) const
   struct Node
   {
     float cost = std::numeric_limits<float>::infinity();
-    float from[3], along[3]; // by axis: the better neighbour's cost and that of the way from it
+    float from[3];       // by axis: the better neighbour's cost
+    float along[3] = {}; // and that of the way from it
     bool taken = false;
     Node() { std::fill_n(this->from, 3, std::numeric_limits<float>::infinity()); }
   };
