@@ -12,8 +12,8 @@
  *        max over v of  v' M (v - mean) / v' A_G v  <=  quality / 2,   the mean weighted by M,
  *      where M is the diagonal of A, and A_G the part of A within G, with G's sinks: what is lost
  *      by taking G for one is then bounded, whatever the medium is (Napov and Notay 2012, SIAM J.
- *      Sci. Comput. 34, A1079, eq. 3.9 and theorem 3.2).
- *   2. Voxels whose sink is a good part of their diagonal are left to the smoother (ibid., 3.3).
+ *      Sci. Comput. 34, A1079).
+ *   2. Voxels whose sink is a good part of their diagonal are left to the smoother (ibid.).
  *   3. The coarse operator is P' A P, with P = 1 on each set: again faces >= 0 and sinks >= 0, in
  *      rows of a general graph, on which the same is done again.
  *   4. Two steps of conjugate gradients on each coarse grid (Notay and Vassilevski 2008, Numer.
