@@ -4,7 +4,6 @@
 #define LightTransport_Core_Buffer_h
 
 #include <atomic>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -26,43 +25,19 @@ enum class Pages
 };
 
 /**
- * Asks for large pages where the system has them at hand: the first touch then costs a tenth, and
- * what is touched is rounded up to 2 MiB. A system that must make them first, by moving what lies
- * in the way or by getting them back from its host, takes ten times as long as with small pages;
- * so one page in 8 MiB is touched here and now, and if that takes long, the rest are small, as
- * are those asked for in the next second.
+ * Asks for large pages where the system has them: the first touch then costs a tenth, and what is
+ * touched is rounded up to 2 MiB.
  */
 inline void PreferLargePages(void* memory, std::size_t bytes)
 {
 #if defined(MADV_HUGEPAGE)
-  using Clock = std::chrono::steady_clock;
-  static std::atomic<Clock::rep> notBefore{ std::numeric_limits<Clock::rep>::min() };
-  constexpr auto slow = std::chrono::microseconds(600); // zeros for a page: 100 to 200
-  constexpr auto pause = std::chrono::seconds(1);
   constexpr std::uintptr_t page = std::uintptr_t(1) << 21;
-  constexpr std::uintptr_t piece = 4 * page;
-  const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(memory);
-  const std::uintptr_t to = (first + bytes) / page * page;
-  std::uintptr_t from = (first + page - 1) / page * page;
-  while (from < to && Clock::now().time_since_epoch().count() >= notBefore)
+  const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(memory);
+  const std::uintptr_t from = (begin + page - 1) / page * page;
+  const std::uintptr_t to = (begin + bytes) / page * page;
+  if (from < to)
   {
-    const std::uintptr_t end = to - from > piece ? from + piece : to;
-    int tries = 0;
-    Clock::duration took = slow;
-    for (std::uintptr_t at = from; at < end && tries < 2 && took >= slow; at += page, ++tries)
-    {
-      madvise(reinterpret_cast<void*>(at), page, MADV_HUGEPAGE); // a wish
-      const auto began = Clock::now();
-      *reinterpret_cast<volatile char*>(at) = 0; // it is 0, or not there yet
-      took = Clock::now() - began;
-    }
-    if (took >= slow)
-    {
-      notBefore = (Clock::now() + pause).time_since_epoch().count();
-      return;
-    }
-    madvise(reinterpret_cast<void*>(from), end - from, MADV_HUGEPAGE);
-    from = end;
+    madvise(reinterpret_cast<void*>(from), to - from, MADV_HUGEPAGE); // a wish
   }
 #else
   (void)memory;
