@@ -13,6 +13,7 @@
 #include "FrugalScenes.h"
 
 #include "Core/Diffusion.h"
+#include "HardMedia.h"
 #include "vtkLightTransportInternal.h"
 
 #include "vtkDataArray.h"
@@ -34,23 +35,7 @@ using namespace lighttransport;
 
 namespace
 {
-struct Scene
-{
-  Grid grid;
-  std::vector<float> D, sigma_a, q;
-  std::vector<std::uint8_t> outside;
-  Boundary boundary = Boundary::Robin;
-
-  Scene(std::array<int, 3> dims, std::array<double, 3> spacing)
-  {
-    this->grid.dims = dims;
-    this->grid.spacing = spacing;
-    const std::size_t n = static_cast<std::size_t>(this->grid.size());
-    this->D.assign(n, 1.f);
-    this->sigma_a.assign(n, 0.f);
-    this->q.assign(n, 0.f);
-  }
-};
+using Scene = testing::MediumAndSource<float>;
 
 struct Result
 {
@@ -60,12 +45,6 @@ struct Result
 
 Result Solve(const Scene& scene, double tolerance, bool aggregation, const ParallelFor& loop)
 {
-  DiffusionMedium<float> medium;
-  medium.grid = scene.grid;
-  medium.D = scene.D.data();
-  medium.sigma_a = scene.sigma_a.data();
-  medium.outside = scene.outside.empty() ? nullptr : scene.outside.data();
-  medium.boundary = scene.boundary;
   std::vector<double> phi(scene.q.size(), 0.);
   DiffusionControl control;
   control.tolerance = tolerance;
@@ -73,7 +52,7 @@ Result Solve(const Scene& scene, double tolerance, bool aggregation, const Paral
   const auto began = std::chrono::steady_clock::now();
   Result result;
   DiffusionSolver solver(loop);
-  solver.setMedium(medium);
+  solver.setMedium(scene.medium());
   result.report = solver.solveSteady(scene.q.data(), phi.data(), control);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   result.bytes = static_cast<double>(result.report.bytes) / static_cast<double>(scene.grid.size());
@@ -110,52 +89,7 @@ Scene Labyrinth(int n, int width, float wall, float sigma)
     scene.sigma_a[static_cast<std::size_t>(i)] = sigma + (open ? 0.f : 0.1f);
   }
   const int middle = n / 2 / pitch * pitch;
-  scene.q[static_cast<std::size_t>(scene.grid.index(middle, middle, middle))] = 1.f;
-  return scene;
-}
-
-/** One corridor of a voxel that winds through a plane: TestDiffusionRobust's, of n x n. */
-Scene Winding(int n)
-{
-  Scene scene({ { n, n, 3 } }, { { 1., 1., 1. } });
-  scene.boundary = Boundary::ZeroFlux;
-  for (std::int64_t v = 0; v < scene.grid.size(); ++v)
-  {
-    const int i = static_cast<int>(v % n);
-    const int j = static_cast<int>(v / n % n);
-    const bool open = v / n / n == 1 && (j % 2 == 1 || i == ((j / 2) % 2 ? 1 : n - 2));
-    scene.D[static_cast<std::size_t>(v)] = open ? 1.f : 1e-6f;
-  }
-  scene.sigma_a.assign(scene.q.size(), 1e-4f);
-  scene.q[static_cast<std::size_t>(scene.grid.index(1, 1, 1))] = 1.f;
-  return scene;
-}
-
-/** As in TestDiffusionHard. */
-Scene Layers(unsigned int seed)
-{
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> uniform(0., 1.);
-  const int n = 16 + static_cast<int>(seed % 12);
-  Scene scene({ { n, n + 3, n } }, { { 1., 1., std::pow(10., 1. - 2. * uniform(random)) } });
-  const double contrast = std::pow(10., -4. - 6. * uniform(random));
-  const double layer = 5. + 20. * uniform(random);
-  scene.outside.assign(scene.q.size(), 0);
-  const std::size_t m = static_cast<std::size_t>(n);
-  for (std::size_t i = 0; i < scene.q.size(); ++i)
-  {
-    const double x = static_cast<double>(i % m) / n;
-    const double y = static_cast<double>(i / m % (m + 3)) / n;
-    const double z = static_cast<double>(i / (m * (m + 3))) / n;
-    const double wave = std::sin(layer * (z + 0.1 * std::sin(5. * x) + 0.05 * y));
-    scene.D[i] = static_cast<float>(wave > 0. ? contrast : 1.);
-    scene.sigma_a[i] =
-      static_cast<float>((seed % 2 == 0 ? 1e-7 : 1e-3) / static_cast<double>(scene.D[i]));
-    scene.outside[i] = seed % 3 != 0 && wave > 0.6;
-  }
-  const std::size_t lamp = scene.q.size() / 2 + m / 2;
-  scene.outside[lamp] = 0;
-  scene.q[lamp] = 1.f;
+  scene.q[scene.index(middle, middle, middle)] = 1.f;
   return scene;
 }
 
@@ -219,7 +153,7 @@ void CompareLayers(double tolerance, const ParallelFor& loop)
   double seconds[2] = { 0., 0. };
   for (unsigned int seed = 0; seed < 300; ++seed)
   {
-    const Scene scene = Layers(seed);
+    const Scene scene = testing::Layers<float>(seed, 16 + static_cast<int>(seed % 12), 6.);
     for (int alone = 0; alone < 2; ++alone)
     {
       const Result result = Solve(scene, tolerance, alone == 0, loop);
@@ -267,8 +201,10 @@ int main(int argc, char* argv[])
   }
   if (wanted("winding"))
   {
-    Compare("one winding corridor, 33²·3", Winding(33), tolerance, repeat, loop);
-    Compare("one winding corridor, 257²·3", Winding(257), tolerance, repeat, loop);
+    Compare(
+      "one winding corridor, 33²·3", testing::WindingCorridor(33, 1e-6f), tolerance, repeat, loop);
+    Compare("one winding corridor, 257²·3", testing::WindingCorridor(257, 1e-6f), tolerance, repeat,
+      loop);
   }
   if (wanted("labyrinth"))
   {

@@ -11,15 +11,11 @@
 
 using namespace lighttransport;
 using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::Percentile95;
 using lighttransport::testing::Suite;
 
 namespace
 {
-std::size_t index(const DiffusionScene& scene, int i, int j, int k)
-{
-  return static_cast<std::size_t>(scene.grid.index(i, j, k));
-}
-
 DiffusionScene blobs(std::array<int, 3> dims, std::array<double, 3> spacing, double sigma)
 {
   DiffusionScene scene(dims, spacing);
@@ -28,7 +24,7 @@ DiffusionScene blobs(std::array<int, 3> dims, std::array<double, 3> spacing, dou
     [X](double x, double y, double z)
     { return .1 + .4 * (1. + std::sin(15. * x / X) * std::cos(11. * y / X + 7. * z / X)); });
   scene.sigma_a.assign(scene.q.size(), sigma);
-  scene.q[index(scene, dims[0] / 3, dims[1] / 2, dims[2] / 2)] = 1.;
+  scene.q[scene.index(dims[0] / 3, dims[1] / 2, dims[2] / 2)] = 1.;
   return scene;
 }
 
@@ -53,7 +49,7 @@ void identity(Suite& suite)
     DiffusionScene full = scene;
     full.solve(1e-12);
     LT_CHECK(suite, solve(scene, 1).reason == StopReason::Converged);
-    LT_CHECK_NEAR(suite, lighttransport::testing::Percentile95(scene.phi, full.phi), 0., 1e-5);
+    LT_CHECK_NEAR(suite, Percentile95(scene.phi, full.phi), 0., 1e-5);
   }
 }
 
@@ -70,10 +66,10 @@ void walls(Suite& suite)
       {
         for (int j = 0; j < 12; ++j)
         {
-          scene.D[index(scene, position, j, k)] = 0.;
+          scene.D[scene.index(position, j, k)] = 0.;
         }
       }
-      scene.q[index(scene, 4, 5, 6)] = 1.;
+      scene.q[scene.index(4, 5, 6)] = 1.;
       // three corrections, which is not the tolerance
       const DiffusionReport report = solve(scene, factor);
       LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.residual > 1e-8);
@@ -87,7 +83,7 @@ void walls(Suite& suite)
           for (int i = 0; i < 24; ++i)
           {
             double& most = i < position ? lit : dark;
-            most = std::max(most, std::abs(scene.phi[index(scene, i, j, k)]));
+            most = std::max(most, std::abs(scene.phi[scene.index(i, j, k)]));
           }
         }
       }
@@ -106,8 +102,8 @@ void accuracy(Suite& suite)
     full.solve(1e-11);
     const DiffusionReport report = solve(two, 2);
     const DiffusionReport rough = solve(four, 4);
-    const double error2 = lighttransport::testing::Percentile95(two.phi, full.phi);
-    const double error4 = lighttransport::testing::Percentile95(four.phi, full.phi);
+    const double error2 = Percentile95(two.phi, full.phi);
+    const double error4 = Percentile95(four.phi, full.phi);
     std::cout << "sigma_a " << sigma << ": errors " << error2 << " (estimated "
               << report.estimatedError << "), " << error4 << " (" << rough.estimatedError << ")\n";
     LT_CHECK(suite, error2 < 0.01 && error4 < 0.4 && error2 < error4);
@@ -136,7 +132,7 @@ void accuracy(Suite& suite)
     // nor does the number of threads matter
     DiffusionScene threads = full;
     solve(threads, 2, {}, lighttransport::testing::ThreadedFor(3));
-    LT_CHECK_NEAR(suite, lighttransport::testing::Percentile95(threads.phi, two.phi), 0., 1e-6);
+    LT_CHECK_NEAR(suite, Percentile95(threads.phi, two.phi), 0., 1e-6);
   }
 }
 
@@ -162,22 +158,22 @@ void named(Suite& suite)
       DiffusionControl control;
       control.targetError = target;
       const DiffusionReport report = coarse.solve(scene.q.data(), scene.phi.data(), control);
-      const double error = lighttransport::testing::Percentile95(scene.phi, full.phi);
+      const double error = Percentile95(scene.phi, full.phi);
       std::cout << "kind " << kind << ", target " << target << ": error " << error << ", estimated "
                 << report.estimatedError << "\n";
       LT_CHECK(suite, report.reason == StopReason::Converged && error <= target);
       LT_CHECK(suite, report.estimatedError >= error / 3. && report.estimatedError <= 3. * error);
     }
     // a light moves: what is known stays
-    scene.q[index(scene, 12, 18, 18)] = 0.;
-    scene.q[index(scene, 20, 22, 10)] = 1.;
+    scene.q[scene.index(12, 18, 18)] = 0.;
+    scene.q[scene.index(20, 22, 10)] = 1.;
     full.q = scene.q;
     full.solve(1e-12);
     DiffusionControl control;
     control.targetError = .01;
     const DiffusionReport report = coarse.solve(scene.q.data(), scene.phi.data(), control, true);
     LT_CHECK(suite, report.reason == StopReason::Converged);
-    LT_CHECK(suite, lighttransport::testing::Percentile95(scene.phi, full.phi) <= .01);
+    LT_CHECK(suite, Percentile95(scene.phi, full.phi) <= .01);
     control.targetError = 0.;
     control.timeBudget = 1e-9;
     const DiffusionReport hasty = coarse.solve(scene.q.data(), scene.phi.data(), control);
@@ -203,67 +199,64 @@ void hardCases(Suite& suite)
       DiffusionControl control;
       control.targetError = .01;
       const DiffusionReport report = solve(scene, factor, control);
-      const double error = lighttransport::testing::Percentile95(scene.phi, full.phi);
+      const double error = Percentile95(scene.phi, full.phi);
       LT_CHECK(suite,
         error <= .01 || (report.reason == StopReason::MaxIterations && std::isfinite(error)));
     }
   }
   // hidden voxels are walls; nothing starts there
   DiffusionScene scene = blobs({ { 12, 12, 12 } }, { { 1., 1., 1. } }, .01);
-  std::vector<std::uint8_t> outside(scene.q.size(), 0);
+  scene.outside.assign(scene.q.size(), 0);
   for (int j = 0; j < 12; ++j)
   {
     for (int k = 0; k < 12; ++k)
     {
-      outside[index(scene, 7, j, k)] = 1;
-      scene.D[index(scene, 7, j, k)] = std::nan("");
+      scene.outside[scene.index(7, j, k)] = 1;
+      scene.D[scene.index(7, j, k)] = std::nan("");
     }
   }
-  DiffusionMedium<double> medium = scene.medium();
-  medium.outside = outside.data();
   CoarseDiffusion coarse;
-  LT_CHECK(suite, coarse.setMedium(medium, 2).reason == StopReason::Converged);
+  LT_CHECK(suite, coarse.setMedium(scene.medium(), 2).reason == StopReason::Converged);
   DiffusionControl named;
   named.targetError = .01;
   LT_CHECK(
     suite, coarse.solve(scene.q.data(), scene.phi.data(), named).reason == StopReason::Converged);
-  LT_CHECK(suite, scene.phi[index(scene, 5, 6, 6)] > 0.01);
-  LT_CHECK(suite, std::abs(scene.phi[index(scene, 9, 6, 6)]) < 1e-14);
+  LT_CHECK(suite, scene.phi[scene.index(5, 6, 6)] > 0.01);
+  LT_CHECK(suite, std::abs(scene.phi[scene.index(9, 6, 6)]) < 1e-14);
   bool dark = true;
-  for (std::size_t i = 0; i < outside.size(); ++i)
+  for (std::size_t i = 0; i < scene.outside.size(); ++i)
   {
-    dark = dark && (!outside[i] || scene.phi[i] == 0.);
+    dark = dark && (!scene.outside[i] || scene.phi[i] == 0.);
   }
   LT_CHECK(suite, dark);
 
   // A closed room beside open matter: a cell has both, and the open part's sinks.
   DiffusionScene room({ { 40, 3, 1 } }, { { 1., 1., 1. } });
-  room.D[index(room, 17, 0, 0)] = room.D[index(room, 17, 1, 0)] = room.D[index(room, 17, 2, 0)] =
-    0.;
+  room.D[room.index(17, 0, 0)] = room.D[room.index(17, 1, 0)] = room.D[room.index(17, 2, 0)] = 0.;
   for (int i = 0; i < 17; ++i)
   {
-    room.D[index(room, i, 2, 0)] = 0.;
+    room.D[room.index(i, 2, 0)] = 0.;
   }
   room.boundary = Boundary::ZeroFlux;
   for (int i = 18; i < 40; ++i)
   {
-    room.sigma_a[index(room, i, 1, 0)] = .1;
+    room.sigma_a[room.index(i, 1, 0)] = .1;
   }
-  room.q[index(room, 15, 1, 0)] = 1.;
+  room.q[room.index(15, 1, 0)] = 1.;
   for (const int factor : { 1, 2, 4, 8 })
   {
     const DiffusionReport refused = solve(room, factor);
     LT_CHECK(suite, refused.reason == StopReason::NoSteadyState);
     LT_CHECK(suite, refused.message.find("(15, 1, 0)") != std::string::npos);
-    LT_CHECK(suite, room.phi[index(room, 15, 1, 0)] == 0.);
+    LT_CHECK(suite, room.phi[room.index(15, 1, 0)] == 0.);
   }
   // with a hole it is a scene like others, and nothing of positive light is negative
-  room.D[index(room, 17, 1, 0)] = 1e-3;
+  room.D[room.index(17, 1, 0)] = 1e-3;
   for (const int factor : { 1, 2, 4, 8 })
   {
     LT_CHECK(suite, solve(room, factor).reason != StopReason::NoSteadyState);
     LT_CHECK(suite, *std::min_element(room.phi.begin(), room.phi.end()) >= 0.);
-    LT_CHECK(suite, room.phi[index(room, 15, 1, 0)] > 0.);
+    LT_CHECK(suite, room.phi[room.index(15, 1, 0)] > 0.);
   }
 
   // refused as the full grid refuses
@@ -293,13 +286,13 @@ void hardCases(Suite& suite)
     DiffusionScene extreme({ { 16, 16, 16 } }, { { h, h, h } });
     extreme.fill(extreme.D, [h](double x, double, double) { return x < 8. * h ? h : 1e-8 * h; });
     extreme.sigma_a.assign(extreme.q.size(), .01 / h);
-    extreme.q[index(extreme, 4, 8, 8)] = h < 1. ? 1e30 : -1e-30;
+    extreme.q[extreme.index(4, 8, 8)] = h < 1. ? 1e30 : -1e-30;
     DiffusionScene full = extreme;
     full.solve(1e-12);
     DiffusionControl one;
     one.targetError = .01;
     LT_CHECK(suite, solve(extreme, 2, one).reason == StopReason::Converged);
-    LT_CHECK(suite, lighttransport::testing::Percentile95(extreme.phi, full.phi) <= .01);
+    LT_CHECK(suite, Percentile95(extreme.phi, full.phi) <= .01);
   }
 }
 } // namespace

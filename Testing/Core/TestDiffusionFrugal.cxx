@@ -14,15 +14,11 @@
 
 using namespace lighttransport;
 using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::Percentile95;
 using lighttransport::testing::Suite;
 
 namespace
 {
-std::size_t index(const DiffusionScene& scene, int i, int j, int k)
-{
-  return static_cast<std::size_t>(scene.grid.index(i, j, k));
-}
-
 /** A bent tube in absorbing tissue. */
 DiffusionScene tube(int n, double wall, double radius = 2.5)
 {
@@ -53,7 +49,7 @@ void activeRegion(Suite& suite)
   for (const double sign : { 1., -1. })
   {
     DiffusionScene full = tube(96, 1e-4);
-    full.q[index(full, 30, 48, 70)] = sign; // somewhere else, of either sign
+    full.q[full.index(30, 48, 70)] = sign; // somewhere else, of either sign
     DiffusionScene active = full;
     const DiffusionReport whole = full.solve(1e-9);
     DiffusionSolver solver;
@@ -61,7 +57,7 @@ void activeRegion(Suite& suite)
     control.tolerance = 1e-9;
     const DiffusionReport report =
       solver.solveActive(active.medium(), active.q.data(), active.phi.data(), control, 1e-7);
-    const double error = lighttransport::testing::Percentile95(active.phi, full.phi);
+    const double error = Percentile95(active.phi, full.phi);
     std::cout << "tube: " << report.activeFraction << " of the voxels, " << report.fineApplications
               << " instead of " << whole.fineApplications << " full applications, error " << error
               << ", leaked " << report.leaked << "\n";
@@ -84,7 +80,7 @@ void activeRegion(Suite& suite)
     // long in places, and float no longer sees that it is positive.
     DiffusionScene full = tube(64, 1e-4, 4.);
     full.q.assign(full.q.size(), 0.);
-    full.q[index(full, 25, 40, 22)] = 1.;
+    full.q[full.index(25, 40, 22)] = 1.;
     DiffusionScene active = full;
     full.solve(1e-9);
     DiffusionSolver solver;
@@ -94,14 +90,14 @@ void activeRegion(Suite& suite)
     std::cout << "wide tube: " << ToString(report.reason) << ", " << report.iterations
               << " iterations\n";
     LT_CHECK(suite, report.reason == StopReason::Converged);
-    LT_CHECK(suite, lighttransport::testing::Percentile95(active.phi, full.phi) < 1e-2);
+    LT_CHECK(suite, Percentile95(active.phi, full.phi) < 1e-2);
   }
   {
     // light that fills the volume: the full solve, and little lost on the way there
     DiffusionScene full({ { 48, 48, 48 } }, { { 1., 1., 1. } });
     full.sigma_a.assign(full.q.size(), 1e-4);
-    full.D[index(full, 40, 40, 40)] = 0.5; // not constant, which is solved at once
-    full.q[index(full, 24, 24, 24)] = 1.;
+    full.D[full.index(40, 40, 40)] = 0.5; // not constant, which is solved at once
+    full.q[full.index(24, 24, 24)] = 1.;
     DiffusionScene active = full;
     const DiffusionReport whole = full.solve(1e-8);
     DiffusionSolver solver;
@@ -112,7 +108,7 @@ void activeRegion(Suite& suite)
               << "\n";
     LT_CHECK(suite, report.reason == StopReason::Converged && report.activeFraction == 1.);
     LT_CHECK(suite, report.fineApplications < 1.2 * whole.fineApplications);
-    LT_CHECK_NEAR(suite, lighttransport::testing::Percentile95(active.phi, full.phi), 0., 1e-4);
+    LT_CHECK_NEAR(suite, Percentile95(active.phi, full.phi), 0., 1e-4);
   }
   {
     // nowhere to go, no light, bad input: as the full solve
@@ -163,7 +159,7 @@ void targetError(Suite& suite)
       control.targetError = target;
       scene.phi.assign(scene.phi.size(), 0.);
       const DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
-      const double error = lighttransport::testing::Percentile95(scene.phi, exact.phi);
+      const double error = Percentile95(scene.phi, exact.phi);
       std::cout << "kind " << kind << ", target " << target << ": " << report.iterations
                 << " iterations, error " << error << ", estimated " << report.estimatedError
                 << "\n";
@@ -201,17 +197,17 @@ void signs(Suite& suite)
         const int axis = i % 4 == 3 ? 0 : j % 4 == 3 ? 1 : 2;
         const std::size_t room = static_cast<std::size_t>(i / 4 + 10 * (j / 4 + 10 * (k / 4)));
         const bool open = walls == 0 || (walls == 1 && (doors[room] >> axis & 1u));
-        scene.D[index(scene, i, j, k)] = open ? 1. : 1e-6;
-        scene.sigma_a[index(scene, i, j, k)] = open ? 1e-4 : 0.1;
+        scene.D[scene.index(i, j, k)] = open ? 1. : 1e-6;
+        scene.sigma_a[scene.index(i, j, k)] = open ? 1e-4 : 0.1;
       }
     }
   }
-  scene.q[index(scene, 21, 21, 21)] = 1.;
+  scene.q[scene.index(21, 21, 21)] = 1.;
   DiffusionControl control;
   control.targetError = 0.3;
   // With a source of the other sign, too weak to be seen, nothing is said about signs.
   DiffusionScene both = scene;
-  both.q[index(both, 2, 2, 2)] = -1e-30;
+  both.q[both.index(2, 2, 2)] = -1e-30;
   DiffusionReport reports[2];
   double least[2];
   DiffusionScene* const scenes[2] = { &both, &scene };

@@ -7,7 +7,7 @@
  */
 #include "Core/Aggregation.h"
 #include "Core/Diffusion.h"
-#include "DiffusionScene.h"
+#include "HardMedia.h"
 #include "LightTransportTesting.h"
 #include "ThreadedFor.h"
 
@@ -22,6 +22,7 @@
 
 using namespace lighttransport;
 using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::MediumAndSource;
 using lighttransport::testing::Suite;
 
 namespace
@@ -30,30 +31,15 @@ struct Hard
 {
   std::string name;
   DiffusionScene scene;
-  std::vector<std::uint8_t> outside; // may be empty
 
-  Hard(const std::string& what, std::array<int, 3> dims, std::array<double, 3> spacing)
+  Hard(const std::string& what, const MediumAndSource<double>& medium)
     : name(what)
-    , scene(dims, spacing)
+    , scene(medium)
   {
   }
-  DiffusionMedium<double> medium() const
+  Hard(const std::string& what, std::array<int, 3> dims, std::array<double, 3> spacing)
+    : Hard(what, MediumAndSource<double>(dims, spacing))
   {
-    DiffusionMedium<double> m = this->scene.medium();
-    m.outside = this->outside.empty() ? nullptr : this->outside.data();
-    return m;
-  }
-  DiffusionReport solve(double tolerance, const ParallelFor& parallelFor = SerialFor)
-  {
-    DiffusionSolver solver(parallelFor);
-    DiffusionReport report = solver.setMedium(this->medium());
-    if (report.reason == StopReason::Converged)
-    {
-      DiffusionControl control;
-      control.tolerance = tolerance;
-      report = solver.solveSteady(this->scene.q.data(), this->scene.phi.data(), control);
-    }
-    return report;
   }
 };
 
@@ -61,9 +47,8 @@ struct Hard
  * The steady state by Cholesky's factorisation of the band, in double: voxels in the order of the
  * axes, the shortest first. Zero flux or Robin with equal indices; walls fixed to 0.
  */
-std::vector<double> direct(const Hard& hard)
+std::vector<double> direct(const DiffusionScene& scene)
 {
-  const DiffusionScene& scene = hard.scene;
   const std::array<int, 3>& n = scene.grid.dims;
   std::array<int, 3> order{ { 0, 1, 2 } };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return n[a] < n[b]; });
@@ -77,8 +62,7 @@ std::vector<double> direct(const Hard& hard)
   std::vector<double> L(size * width, 0.); // L[i * width + band + j - i], j <= i
   std::vector<double> x(size);
   std::vector<std::size_t> numberOf(size);
-  const auto D = [&](std::size_t v)
-  { return !hard.outside.empty() && hard.outside[v] ? 0. : scene.D[v]; };
+  const auto D = [&](std::size_t v) { return scene.conducts(v); };
   for (int k = 0; k < n[2]; ++k)
   {
     for (int j = 0; j < n[1]; ++j)
@@ -86,7 +70,7 @@ std::vector<double> direct(const Hard& hard)
       for (int i = 0; i < n[0]; ++i)
       {
         const int at[3] = { i, j, k };
-        const std::size_t v = static_cast<std::size_t>(scene.grid.index(i, j, k));
+        const std::size_t v = scene.index(i, j, k);
         const std::size_t stride[3] = { 1, static_cast<std::size_t>(n[0]),
           static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) };
         std::size_t row = 0;
@@ -161,22 +145,10 @@ std::vector<double> direct(const Hard& hard)
   return phi;
 }
 
-/** A winding corridor of one voxel. */
-Hard labyrinth(int n, double wall)
+Hard winding(int n, double wall)
 {
-  Hard hard("labyrinth, walls " + std::to_string(wall), { { n, n, 3 } }, { { 1., 1., 1. } });
-  hard.scene.boundary = Boundary::ZeroFlux;
-  hard.scene.fill(hard.scene.D,
-    [=](double x, double y, double z)
-    {
-      const int i = static_cast<int>(x);
-      const int j = static_cast<int>(y);
-      const bool open = static_cast<int>(z) == 1 && (j % 2 == 1 || i == ((j / 2) % 2 ? 1 : n - 2));
-      return open ? 1. : wall;
-    });
-  hard.scene.sigma_a.assign(hard.scene.q.size(), 1e-4);
-  hard.scene.q[static_cast<std::size_t>(hard.scene.grid.index(1, 1, 1))] = 1.;
-  return hard;
+  return { "winding corridor, walls " + std::to_string(wall),
+    lighttransport::testing::WindingCorridor(n, wall) };
 }
 
 /** Rooms of one voxel, doors between them here and there. */
@@ -195,36 +167,13 @@ Hard rooms(int nx, int ny, int nz, double wall, double sigma, unsigned int seed)
   {
     hard.scene.sigma_a[i] = sigma + (hard.scene.D[i] < 1. ? 0.1 : 0.);
   }
-  hard.scene
-    .q[static_cast<std::size_t>(hard.scene.grid.index(nx / 4 * 2, ny / 4 * 2, nz / 4 * 2))] = 1.;
+  hard.scene.q[hard.scene.index(nx / 4 * 2, ny / 4 * 2, nz / 4 * 2)] = 1.;
   return hard;
 }
 
-/** Wavy layers, parts of the dark ones cut out: as in TestDiffusionRobust, of higher contrast. */
 Hard layers(unsigned int seed, int n)
 {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> uniform(0., 1.);
-  const double hz = std::pow(10., 1. - 2. * uniform(random));
-  const double contrast = std::pow(10., -4. - 6. * uniform(random));
-  const double layer = 5. + 20. * uniform(random);
-  Hard hard("layers " + std::to_string(seed), { { n, n + 3, n } }, { { 1., 1., hz } });
-  hard.outside.assign(hard.scene.q.size(), 0);
-  const std::size_t m = static_cast<std::size_t>(n);
-  for (std::size_t i = 0; i < hard.outside.size(); ++i)
-  {
-    const double x = static_cast<double>(i % m) / n;
-    const double y = static_cast<double>(i / m % (m + 3)) / n;
-    const double z = static_cast<double>(i / (m * (m + 3))) / n;
-    const double wave = std::sin(layer * (z + 0.1 * std::sin(5. * x) + 0.05 * y));
-    hard.scene.D[i] = wave > 0. ? contrast : 1.;
-    hard.scene.sigma_a[i] = (seed % 2 == 0 ? 1e-7 : 1e-3) / hard.scene.D[i];
-    hard.outside[i] = seed % 3 != 0 && wave > 0.6;
-  }
-  const std::size_t lamp = hard.outside.size() / 2 + m / 2;
-  hard.outside[lamp] = 0;
-  hard.scene.q[lamp] = 1.;
-  return hard;
+  return { "layers " + std::to_string(seed), lighttransport::testing::Layers<double>(seed, n, 6.) };
 }
 
 /** Threads that cross each other diagonally: no straight line leads along them. */
@@ -247,14 +196,14 @@ Hard threads(double contrast, std::array<double, 3> spacing)
       }
     }
   }
-  hard.scene.q[static_cast<std::size_t>(hard.scene.grid.index(4, 4, 20))] = 1.;
+  hard.scene.q[hard.scene.index(4, 4, 20)] = 1.;
   return hard;
 }
 
 void expectRight(Suite& suite, Hard& hard, int iterations)
 {
-  const DiffusionReport report = hard.solve(1e-9);
-  const std::vector<double> exact = direct(hard);
+  const DiffusionReport report = hard.scene.solve(1e-9);
+  const std::vector<double> exact = direct(hard.scene);
   double most = 0.;
   double least = 0.;
   double error = 0.;
@@ -280,7 +229,7 @@ void right(Suite& suite)
 {
   for (const double wall : { 1e-2, 1e-4, 1e-6, 0. })
   {
-    Hard hard = labyrinth(33, wall);
+    Hard hard = winding(33, wall);
     expectRight(suite, hard, 40);
   }
   for (const double wall : { 1e-4, 1e-8 })
@@ -313,7 +262,7 @@ void layered(Suite& suite)
   for (int run = 0; run < runs; ++run)
   {
     Hard hard = layers(static_cast<unsigned int>(run), 16 + run % 12);
-    const DiffusionReport report = hard.solve(1e-8);
+    const DiffusionReport report = hard.scene.solve(1e-8);
     suite.check(report.reason == StopReason::Converged, hard.name, __FILE__, __LINE__);
     most = std::max(most, report.iterations);
   }
@@ -388,8 +337,8 @@ void whatTheThreads(Suite& suite)
 {
   Hard one = rooms(40, 41, 42, 1e-6, 1e-4, 5);
   Hard three = one;
-  const DiffusionReport a = one.solve(1e-8);
-  const DiffusionReport b = three.solve(1e-8, lighttransport::testing::ThreadedFor(3));
+  const DiffusionReport a = one.scene.solve(1e-8);
+  const DiffusionReport b = three.scene.solve(1e-8, lighttransport::testing::ThreadedFor(3));
   LT_CHECK(suite, a.reason == StopReason::Converged && b.reason == StopReason::Converged);
   LT_CHECK(suite, a.iterations == b.iterations && a.iterations < 60);
   LT_CHECK(suite, one.scene.phi == three.scene.phi);
@@ -398,10 +347,10 @@ void whatTheThreads(Suite& suite)
   LT_CHECK(suite, perVoxel > 50.); // it was used
 }
 
-/** A labyrinth in an active region, which is a part of the box. */
+/** A winding corridor in an active region, which is a part of the box. */
 void region(Suite& suite)
 {
-  const Hard maze = labyrinth(33, 1e-6);
+  const Hard maze = winding(33, 1e-6);
   Hard hard("region", { { 100, 90, 80 } }, { { 1., 1., 1. } });
   hard.scene.D.assign(hard.scene.q.size(), 1e-6);
   hard.scene.sigma_a.assign(hard.scene.q.size(), 0.1);
@@ -411,9 +360,8 @@ void region(Suite& suite)
     {
       for (int i = 0; i < 33; ++i)
       {
-        const std::size_t from = static_cast<std::size_t>(maze.scene.grid.index(i, j, k));
-        const std::size_t to =
-          static_cast<std::size_t>(hard.scene.grid.index(i + 30, j + 20, k + 40));
+        const std::size_t from = maze.scene.index(i, j, k);
+        const std::size_t to = hard.scene.index(i + 30, j + 20, k + 40);
         hard.scene.D[to] = maze.scene.D[from];
         hard.scene.sigma_a[to] = maze.scene.D[from] < 1. ? 0.1 : 1e-4;
         hard.scene.q[to] = maze.scene.q[from];
@@ -424,14 +372,14 @@ void region(Suite& suite)
   DiffusionControl control;
   control.tolerance = 1e-8;
   const DiffusionReport report =
-    solver.solveActive(hard.medium(), hard.scene.q.data(), hard.scene.phi.data(), control);
+    solver.solveActive(hard.scene.medium(), hard.scene.q.data(), hard.scene.phi.data(), control);
   std::cout << "region: " << report.iterations << " iterations, " << report.activeFraction
             << " of the voxels\n";
   LT_CHECK(suite, report.reason == StopReason::Converged);
   LT_CHECK(suite, report.activeFraction < 0.25 && report.iterations < 100);
   Hard whole = hard;
   whole.scene.phi.assign(whole.scene.phi.size(), 0.);
-  LT_CHECK(suite, whole.solve(1e-10).reason == StopReason::Converged);
+  LT_CHECK(suite, whole.scene.solve(1e-10).reason == StopReason::Converged);
   double error = 0.;
   double norm = 0.;
   for (std::size_t i = 0; i < whole.scene.phi.size(); ++i)
@@ -453,7 +401,7 @@ void easy(Suite& suite)
     });
   hard.scene.sigma_a.assign(hard.scene.q.size(), 1e-3);
   hard.scene.q[32020] = 1.;
-  const DiffusionReport report = hard.solve(1e-8);
+  const DiffusionReport report = hard.scene.solve(1e-8);
   LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations < 16);
   LT_CHECK(suite, report.bytes < 48 * static_cast<std::int64_t>(hard.scene.q.size()));
 }
@@ -463,7 +411,7 @@ void cancelled(Suite& suite)
 {
   Hard hard = rooms(64, 56, 48, 1e-6, 1e-4, 5);
   DiffusionSolver solver;
-  LT_CHECK(suite, solver.setMedium(hard.medium()).reason == StopReason::Converged);
+  LT_CHECK(suite, solver.setMedium(hard.scene.medium()).reason == StopReason::Converged);
   DiffusionControl control;
   control.tolerance = 1e-6;
   int calls = 0;
@@ -478,7 +426,7 @@ void cancelled(Suite& suite)
   const int all = calls;
   for (int stop = 4; stop < all; stop += std::max(1, all / 8))
   {
-    solver.setMedium(hard.medium());
+    solver.setMedium(hard.scene.medium());
     calls = 0;
     control.progress = [&](double) { return ++calls < stop; };
     phi.assign(phi.size(), 0.);
@@ -503,7 +451,7 @@ void refused(Suite& suite)
 {
   Hard hard = rooms(80, 81, 82, 1e-4, 1e-3, 5);
   DiffusionSolver solver;
-  LT_CHECK(suite, solver.setMedium(hard.medium()).reason == StopReason::Converged);
+  LT_CHECK(suite, solver.setMedium(hard.scene.medium()).reason == StopReason::Converged);
   DiffusionControl control;
   rlimit before;
   getrlimit(RLIMIT_AS, &before);
@@ -528,7 +476,7 @@ void refused(Suite& suite)
   LT_CHECK(suite, report.reason == StopReason::Converged);
   LT_CHECK(suite, report.bytes < 50 * static_cast<std::int64_t>(hard.scene.q.size()));
   hard.scene.phi.assign(hard.scene.phi.size(), 0.);
-  const DiffusionReport again = hard.solve(control.tolerance);
+  const DiffusionReport again = hard.scene.solve(control.tolerance);
   LT_CHECK(suite, again.iterations < report.iterations);
 }
 #else

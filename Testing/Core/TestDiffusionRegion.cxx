@@ -17,6 +17,7 @@
 using namespace lighttransport;
 using lighttransport::testing::DiffusionScene;
 using lighttransport::testing::Percentile95;
+using lighttransport::testing::RelativeL2;
 using lighttransport::testing::Suite;
 
 namespace
@@ -28,31 +29,11 @@ struct Expected
   double largest = 0.25; ///< region
 };
 
-DiffusionMedium<double> mediumOf(
-  const DiffusionScene& scene, const std::vector<std::uint8_t>& outside)
-{
-  DiffusionMedium<double> medium = scene.medium();
-  medium.outside = outside.empty() ? nullptr : outside.data();
-  return medium;
-}
-
-double relativeL2(const std::vector<double>& phi, const std::vector<double>& exact)
-{
-  double wrong = 0.;
-  double all = 0.;
-  for (std::size_t i = 0; i < phi.size(); ++i)
-  {
-    wrong += (phi[i] - exact[i]) * (phi[i] - exact[i]);
-    all += exact[i] * exact[i];
-  }
-  return all > 0. ? std::sqrt(wrong / all) : std::sqrt(wrong);
-}
-
 /** Solves on the region and on the volume, to `tolerance`, and compares. */
-DiffusionReport compare(Suite& suite, const std::string& name, const DiffusionScene& scene,
-  const Expected& expected, const std::vector<std::uint8_t>& outside = {})
+DiffusionReport compare(
+  Suite& suite, const std::string& name, const DiffusionScene& scene, const Expected& expected)
 {
-  const DiffusionMedium<double> medium = mediumOf(scene, outside);
+  const DiffusionMedium<double> medium = scene.medium();
   DiffusionControl control;
   control.tolerance = 1e-9;
   std::vector<double> whole(scene.q.size(), 0.);
@@ -73,7 +54,7 @@ DiffusionReport compare(Suite& suite, const std::string& name, const DiffusionSc
     power += std::abs(q) * scene.grid.voxelVolume();
   }
   const double error = Percentile95(phi, whole);
-  const double l2 = relativeL2(phi, whole);
+  const double l2 = RelativeL2(phi, whole);
   const double lost = report.absorbed + report.escaped + report.leaked - report.emitted;
   std::cout << name << ": " << ToString(report.reason) << ", " << 100. * report.activeFraction
             << " %, " << report.iterations << " iterations, p95 " << error << ", L2 " << l2
@@ -120,7 +101,7 @@ void light(DiffusionScene& scene, double x, double power)
   const double t = x / scene.grid.dims[0];
   const int j = static_cast<int>(scene.grid.dims[1] * (.5 + .25 * std::sin(5. * t)));
   const int k = static_cast<int>(scene.grid.dims[2] * (.5 + .25 * std::cos(5. * t)));
-  scene.q[static_cast<std::size_t>(scene.grid.index(static_cast<int>(x), j, k))] += power;
+  scene.q[scene.index(static_cast<int>(x), j, k)] += power;
 }
 
 void vessels(Suite& suite)
@@ -145,7 +126,7 @@ void vessels(Suite& suite)
     light(scene, 10., 1.);
     light(scene, 84., -1e-3);
     compare(suite, "two lights", scene, { 0., 0.12 });
-    scene.q[static_cast<std::size_t>(scene.grid.index(50, 3, 3))] = 1e-2; // and one in the dark
+    scene.q[scene.index(50, 3, 3)] = 1e-2; // and one in the dark
     compare(suite, "one in the dark", scene, { 0., 0.12 });
   }
   {
@@ -177,7 +158,7 @@ void borders(Suite& suite)
     scene.boundary = boundary;
     scene.sigma_a.assign(scene.q.size(), 2.);
     scene.D.back() = 0.9; // what is constant is solved at once
-    scene.q[static_cast<std::size_t>(scene.grid.index(0, 20, 40))] = 1.;
+    scene.q[scene.index(0, 20, 40)] = 1.;
     compare(suite, "at the border", scene, { 0., 0.5 });
   }
   {
@@ -185,7 +166,7 @@ void borders(Suite& suite)
     DiffusionScene scene({ { 40, 38, 38 } }, { { 1., 1., 1. } });
     scene.sigma_a.assign(scene.q.size(), 2.);
     scene.fill(scene.D, [](double x, double, double) { return x > 20. && x < 21. ? 0. : 1.; });
-    scene.q[static_cast<std::size_t>(scene.grid.index(19, 15, 15))] = 1.;
+    scene.q[scene.index(19, 15, 15)] = 1.;
     compare(suite, "beside a wall", scene, { 0., 0.5 });
   }
   {
@@ -199,7 +180,7 @@ void borders(Suite& suite)
         return r > 5. && r < 6. ? 0. : 1.;
       });
     scene.sigma_a.assign(scene.q.size(), 1e-3);
-    scene.q[static_cast<std::size_t>(scene.grid.index(13, 12, 12))] = 1.;
+    scene.q[scene.index(13, 12, 12)] = 1.;
     const DiffusionReport report = compare(suite, "chamber", scene, { 0., 0.05, 1e-6 });
     LT_CHECK(suite, report.leaked == 0.);
     scene.sigma_a.assign(scene.q.size(), 0.);
@@ -208,21 +189,21 @@ void borders(Suite& suite)
     LT_CHECK(suite,
       solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control).reason ==
         StopReason::NoSteadyState);
-    scene.q[static_cast<std::size_t>(scene.grid.index(9, 10, 14))] = -1.;
+    scene.q[scene.index(9, 10, 14)] = -1.;
     compare(suite, "chamber, balanced", scene, { 1., 1., 1e-6 });
   }
   {
     // no part of the domain
     DiffusionScene scene({ { 32, 32, 32 } }, { { 1., 1., 1. } });
     scene.sigma_a.assign(scene.q.size(), 0.1);
-    std::vector<std::uint8_t> outside(scene.q.size(), 0);
-    for (std::size_t i = 0; i < outside.size(); ++i)
+    scene.outside.assign(scene.q.size(), 0);
+    for (std::size_t i = 0; i < scene.outside.size(); ++i)
     {
-      outside[i] = (i / 32) % 32 > 15 ? 1 : 0;
+      scene.outside[i] = (i / 32) % 32 > 15 ? 1 : 0;
     }
-    scene.q[static_cast<std::size_t>(scene.grid.index(4, 4, 4))] = 1.;
+    scene.q[scene.index(4, 4, 4)] = 1.;
     scene.D.assign(scene.D.size(), 0.01);
-    compare(suite, "half outside", scene, { 0., 0.25 }, outside);
+    compare(suite, "half outside", scene, { 0., 0.25 });
   }
 }
 
@@ -266,7 +247,7 @@ void open(Suite& suite)
   scene.fill(scene.D,
     [](double x, double y, double z) { return .6 + .4 * std::sin(.5 * x) * std::cos(.4 * y + z); });
   scene.sigma_a.assign(scene.q.size(), 1e-4);
-  scene.q[static_cast<std::size_t>(scene.grid.index(20, 18, 16))] = 1.;
+  scene.q[scene.index(20, 18, 16)] = 1.;
   compare(suite, "open", scene, { 1., 1., 1e-4 });
   DiffusionSolver solver;
   DiffusionControl control;
@@ -312,7 +293,7 @@ void cuts(Suite& suite)
       const DiffusionReport report =
         solver.solveActive(scene.medium(), scene.q.data(), scene.phi.data(), control, threshold);
       const double error = Percentile95(scene.phi, full.phi);
-      const double l2 = relativeL2(scene.phi, full.phi);
+      const double l2 = RelativeL2(scene.phi, full.phi);
       std::cout << "cut at " << threshold << ": " << error << ", estimated "
                 << report.estimatedError << ", L2 " << l2 << ", estimated "
                 << report.estimatedErrorL2 << ", " << report.activeFraction << "\n";
@@ -330,10 +311,10 @@ void extremes(Suite& suite)
     // in walls: closed, and nearly so; and close to each other, of both signs
     DiffusionScene scene = vessel({ { 48, 32, 32 } }, 3., 1e-2, 1e-4, 1.);
     light(scene, 20., 1.);
-    const std::size_t closed = static_cast<std::size_t>(scene.grid.index(30, 3, 3));
+    const std::size_t closed = scene.index(30, 3, 3);
     scene.D[closed] = 0.;
     scene.q[closed] = 0.5;
-    scene.q[static_cast<std::size_t>(scene.grid.index(12, 2, 2))] = 0.5;
+    scene.q[scene.index(12, 2, 2)] = 0.5;
     compare(suite, "in walls", scene, { 0., 0.2 });
     light(scene, 21., -1.);
     light(scene, 23., -1e-4);
@@ -343,15 +324,15 @@ void extremes(Suite& suite)
     // a vessel that the mask cuts
     DiffusionScene scene = vessel({ { 48, 32, 32 } }, 3., 1e-2, 1e-4, 1.);
     light(scene, 20., 1.);
-    std::vector<std::uint8_t> outside(scene.q.size(), 0);
+    scene.outside.assign(scene.q.size(), 0);
     for (int i = 36; i < 48; ++i)
     {
       for (int row = 0; row < 32 * 32; ++row)
       {
-        outside[static_cast<std::size_t>(i + 48 * row)] = 1;
+        scene.outside[static_cast<std::size_t>(i + 48 * row)] = 1;
       }
     }
-    compare(suite, "masked", scene, { 0., 0.2 }, outside);
+    compare(suite, "masked", scene, { 0., 0.2 });
   }
   for (const Boundary boundary : { Boundary::Robin, Boundary::ZeroFlux, Boundary::Absorbing })
   {
@@ -456,7 +437,7 @@ void control(Suite& suite)
               << ", " << report.iterations << " iterations\n";
     LT_CHECK(suite, report.reason == StopReason::Converged && report.activeFraction < 0.1);
     LT_CHECK(suite, error <= target);
-    LT_CHECK(suite, relativeL2(scene.phi, full.phi) <= target);
+    LT_CHECK(suite, RelativeL2(scene.phi, full.phi) <= target);
     LT_CHECK(suite, report.estimatedError > 0. && report.estimatedError <= target);
   }
   // float arrays; shown as it comes; cancelled; late

@@ -5,7 +5,7 @@
  * the iterations are bounded. Then what has no answer, and what stops early.
  */
 #include "Core/FirstMoment.h"
-#include "DiffusionScene.h"
+#include "HardMedia.h"
 #include "LightTransportTesting.h"
 
 #include <limits>
@@ -17,11 +17,6 @@ using lighttransport::testing::Suite;
 
 namespace
 {
-std::size_t index(const DiffusionScene& scene, int i, int j, int k)
-{
-  return static_cast<std::size_t>(scene.grid.index(i, j, k));
-}
-
 void expectSolved(Suite& suite, const std::string& name, DiffusionScene& scene, int iterations,
   double tolerance = 1e-8)
 {
@@ -59,7 +54,7 @@ void hardMedia(Suite& suite)
       scene.D[i] = std::pow(10., -decades * uniform(random));
       scene.sigma_a[i] = 1e-3 * (1. - scene.D[i]);
     }
-    scene.q[index(scene, 15, 15, 15)] = 1.;
+    scene.q[scene.index(15, 15, 15)] = 1.;
     expectSolved(
       suite, "noise over " + std::to_string(decades) + " decades", scene, decades > 4. ? 150 : 60);
   }
@@ -70,30 +65,19 @@ void hardMedia(Suite& suite)
         return (static_cast<int>(x) + static_cast<int>(y) + static_cast<int>(z)) % 2 ? 1e-8 : 1.;
       });
     scene.sigma_a.assign(scene.q.size(), 1e-4);
-    scene.q[index(scene, 16, 16, 16)] = 1.;
+    scene.q[scene.index(16, 16, 16)] = 1.;
     expectSolved(suite, "checkerboard 1e8", scene, 60);
   }
   {
     DiffusionScene scene({ { 32, 32, 32 } }, { { 1., 1., 1. } });
     scene.fill(scene.D, [](double x, double, double) { return x < 15. ? 1. : 1e-8; });
-    scene.q[index(scene, 8, 16, 16)] = 1.;
+    scene.q[scene.index(8, 16, 16)] = 1.;
     expectSolved(suite, "one face 1e8", scene, 30);
   }
   {
-    // a winding corridor of one voxel, and nothing but its ends lets light out
-    DiffusionScene scene({ { 33, 33, 3 } }, { { 1., 1., 1. } });
-    scene.boundary = Boundary::ZeroFlux;
-    scene.fill(scene.D,
-      [](double x, double y, double z)
-      {
-        const int i = static_cast<int>(x);
-        const int j = static_cast<int>(y);
-        const bool open = static_cast<int>(z) == 1 && (j % 2 == 1 || i == ((j / 2) % 2 ? 1 : 31));
-        return open ? 1. : 1e-6;
-      });
-    scene.sigma_a.assign(scene.q.size(), 1e-4);
-    scene.q[index(scene, 1, 1, 1)] = 1.;
-    expectSolved(suite, "labyrinth", scene, 40); // two corridors in one coarse voxel
+    // nothing but the corridor's ends lets light out
+    DiffusionScene scene(lighttransport::testing::WindingCorridor(33, 1e-6));
+    expectSolved(suite, "winding corridor", scene, 40); // two corridors in one coarse voxel
   }
   for (const double ratio : { 10., 1000. })
   {
@@ -103,7 +87,7 @@ void hardMedia(Suite& suite)
       scene.D[i] = std::pow(10., -2. * uniform(random));
       scene.sigma_a[i] = 1e-3;
     }
-    scene.q[index(scene, 10, 12, 14)] = 1.;
+    scene.q[scene.index(10, 12, 14)] = 1.;
     expectSolved(suite, "spacing 1:" + std::to_string(ratio), scene, 60);
   }
   for (const std::array<int, 3>& dims : { std::array<int, 3>{ { 1, 1, 101 } },
@@ -126,8 +110,8 @@ void hardMedia(Suite& suite)
     DiffusionScene scene({ { 16, 16, 16 } }, { { 1., 1., 1. } });
     scene.boundary = Boundary::ZeroFlux;
     scene.sigma_a.assign(scene.q.size(), 1e-8);
-    scene.D[index(scene, 12, 12, 12)] = 0.5; // not constant, which is solved at once
-    scene.q[index(scene, 3, 4, 5)] = 1.;
+    scene.D[scene.index(12, 12, 12)] = 0.5; // not constant, which is solved at once
+    scene.q[scene.index(3, 4, 5)] = 1.;
     expectSolved(suite, "nearly singular", scene, 30);
     LT_CHECK_CLOSE(suite, scene.phi[0], 1e8 / 4096., 1e-5);
     // Four decades less, and phi is 2e8 times q: double's rounding of A phi is above the
@@ -143,8 +127,8 @@ void hardMedia(Suite& suite)
   {
     DiffusionScene scene({ { 12, 12, 12 } }, { { 1., 1., 1. } });
     scene.sigma_a.assign(scene.q.size(), 0.1);
-    scene.q[index(scene, 6, 6, 6)] = power;
-    scene.q[index(scene, 2, 2, 2)] = power;
+    scene.q[scene.index(6, 6, 6)] = power;
+    scene.q[scene.index(2, 2, 2)] = power;
     const DiffusionReport report = scene.solve(1e-8);
     LT_CHECK(suite, report.reason == StopReason::Converged);
     LT_CHECK_CLOSE(suite, report.absorbed + report.escaped, 2. * power, 1e-6);
@@ -155,13 +139,13 @@ void noAnswer(Suite& suite)
 {
   DiffusionScene scene({ { 8, 8, 8 } }, { { 1., 1., 1. } });
   scene.boundary = Boundary::ZeroFlux;
-  scene.q[index(scene, 2, 2, 2)] = 1.;
+  scene.q[scene.index(2, 2, 2)] = 1.;
   DiffusionReport report = scene.solve();
   LT_CHECK(suite, report.reason == StopReason::NoSteadyState && report.iterations == 0);
   LT_CHECK(suite, report.message.find("absorption") != std::string::npos);
 
   // balanced sources have one, up to a constant, which is taken such that the mean is 0
-  scene.q[index(scene, 6, 5, 4)] = -1.;
+  scene.q[scene.index(6, 5, 4)] = -1.;
   report = scene.solve();
   LT_CHECK(suite, report.reason == StopReason::Converged);
   LT_CHECK(suite, scene.residual() < 1e-6);
@@ -180,16 +164,16 @@ void noAnswer(Suite& suite)
       const double d = std::max(std::max(std::abs(x - 4.5), std::abs(y - 4.5)), std::abs(z - 4.5));
       return d > 1.2 && d < 2.2 ? 0. : 1.;
     });
-  room.q[index(room, 4, 4, 4)] = 1.;
+  room.q[room.index(4, 4, 4)] = 1.;
   report = room.solve();
   LT_CHECK(suite, report.reason == StopReason::NoSteadyState);
   LT_CHECK(suite, report.message.find("(4, 4, 4)") != std::string::npos);
   room.q.assign(room.q.size(), 0.);
-  room.q[index(room, 0, 0, 0)] = 1.;
+  room.q[room.index(0, 0, 0)] = 1.;
   LT_CHECK(suite, room.solve().reason == StopReason::Converged);
-  LT_CHECK(suite, room.phi[index(room, 4, 4, 4)] == 0.);
+  LT_CHECK(suite, room.phi[room.index(4, 4, 4)] == 0.);
   // a source inside the wall itself
-  room.q[index(room, 6, 4, 4)] = 1.;
+  room.q[room.index(6, 4, 4)] = 1.;
   LT_CHECK(suite, room.solve().reason == StopReason::NoSteadyState);
 
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -197,13 +181,13 @@ void noAnswer(Suite& suite)
   for (const double bad : { nan, inf, -1. })
   {
     DiffusionScene wrong({ { 4, 5, 6 } }, { { 1., 1., 1. } });
-    wrong.D[index(wrong, 1, 2, 3)] = bad;
+    wrong.D[wrong.index(1, 2, 3)] = bad;
     report = wrong.solve();
     LT_CHECK(suite, report.reason == StopReason::BadInput);
     LT_CHECK(suite, report.message.find("diffusion coefficient") != std::string::npos);
     LT_CHECK(suite, report.message.find("(1, 2, 3)") != std::string::npos);
-    wrong.D[index(wrong, 1, 2, 3)] = 1.;
-    wrong.sigma_a[index(wrong, 3, 4, 5)] = bad;
+    wrong.D[wrong.index(1, 2, 3)] = 1.;
+    wrong.sigma_a[wrong.index(3, 4, 5)] = bad;
     report = wrong.solve();
     LT_CHECK(suite, report.reason == StopReason::BadInput);
     LT_CHECK(suite, report.message.find("absorption") != std::string::npos);
@@ -214,8 +198,8 @@ void stops(Suite& suite)
 {
   DiffusionScene scene({ { 24, 24, 24 } }, { { 1., 1., 1. } });
   scene.sigma_a.assign(scene.q.size(), 1e-3);
-  scene.D[index(scene, 20, 20, 20)] = 0.5; // a constant medium is solved at once
-  scene.q[index(scene, 5, 6, 7)] = 1.;
+  scene.D[scene.index(20, 20, 20)] = 0.5; // a constant medium is solved at once
+  scene.q[scene.index(5, 6, 7)] = 1.;
   // more than double can give: an honest stop, the best answer kept
   DiffusionReport report = scene.solve(1e-19);
   LT_CHECK(
@@ -387,33 +371,10 @@ void layers(Suite& suite)
   int solved = 0;
   for (int run = 0; run < 60; ++run)
   {
-    std::mt19937 random(static_cast<unsigned int>(run));
-    std::uniform_real_distribution<double> uniform(0., 1.);
-    const int n = 16 + run % 12;
     DiffusionScene scene(
-      { { n, n + 3, n } }, { { 1., 1., std::pow(10., 1. - 2. * uniform(random)) } });
-    const double contrast = std::pow(10., -4. - 4. * uniform(random));
-    const double layer = 5. + 20. * uniform(random);
-    std::vector<std::uint8_t> outside(scene.q.size(), 0);
-    for (std::size_t i = 0; i < outside.size(); ++i)
-    {
-      const std::size_t row = i / static_cast<std::size_t>(n);
-      const std::size_t plane = row / static_cast<std::size_t>(n + 3);
-      const double x = static_cast<double>(i % static_cast<std::size_t>(n)) / n;
-      const double y = static_cast<double>(row % static_cast<std::size_t>(n + 3)) / n;
-      const double z = static_cast<double>(plane) / n;
-      const double wave = std::sin(layer * (z + 0.1 * std::sin(5. * x) + 0.05 * y));
-      scene.D[i] = wave > 0. ? contrast : 1.;
-      scene.sigma_a[i] = (run % 2 == 0 ? 1e-7 : 1e-3) / scene.D[i];
-      outside[i] = run % 3 != 0 && wave > 0.6;
-    }
-    const std::size_t lamp = outside.size() / 2 + static_cast<std::size_t>(n / 2);
-    outside[lamp] = 0;
-    scene.q[lamp] = 1.;
-    DiffusionMedium<double> medium = scene.medium();
-    medium.outside = outside.data();
+      lighttransport::testing::Layers<double>(static_cast<unsigned int>(run), 16 + run % 12, 4.));
     DiffusionSolver solver;
-    LT_CHECK(suite, solver.setMedium(medium).reason == StopReason::Converged);
+    LT_CHECK(suite, solver.setMedium(scene.medium()).reason == StopReason::Converged);
     DiffusionControl control;
     control.tolerance = 1e-8;
     control.maxIterations = 100;
@@ -440,13 +401,13 @@ void early(Suite& suite)
     scene.D[i] = std::pow(10., -6. * uniform(random));
     scene.sigma_a[i] = 1e-3;
   }
-  scene.q[index(scene, 2, 3, 4)] = 1.;
+  scene.q[scene.index(2, 3, 4)] = 1.;
   DiffusionSolver solver;
   solver.setMedium(scene.medium());
   bool negative = false;
   for (const double sign : { 1., -1. })
   {
-    scene.q[index(scene, 2, 3, 4)] = sign;
+    scene.q[scene.index(2, 3, 4)] = sign;
     for (int iterations = 1; iterations < 12; ++iterations)
     {
       DiffusionControl control;
@@ -532,17 +493,15 @@ void early(Suite& suite)
   }
 
   // outside the domain nothing starts, and nothing is left from before
-  std::vector<std::uint8_t> outside(scene.q.size(), 0);
-  outside[index(scene, 5, 6, 7)] = 1;
-  DiffusionMedium<double> medium = scene.medium();
-  medium.outside = outside.data();
-  solver.setMedium(medium);
+  scene.outside.assign(scene.q.size(), 0);
+  scene.outside[scene.index(5, 6, 7)] = 1;
+  solver.setMedium(scene.medium());
   control.maxIterations = 100;
   std::fill(scene.phi.begin(), scene.phi.end(), 3.);
   report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
   LT_CHECK(suite, report.reason == StopReason::Converged);
-  LT_CHECK(suite, scene.phi[index(scene, 5, 6, 7)] == 0.);
-  scene.q[index(scene, 5, 6, 7)] = 2.;
+  LT_CHECK(suite, scene.phi[scene.index(5, 6, 7)] == 0.);
+  scene.q[scene.index(5, 6, 7)] = 2.;
   const auto refused = [&](const DiffusionReport& answer)
   {
     LT_CHECK(suite, answer.reason == StopReason::BadInput);
@@ -604,26 +563,26 @@ void cancelling(Suite& suite)
     scene.boundary = Boundary::ZeroFlux;
     const int n = scene.grid.dims[0];
     const double contrast = 5. * uniform(random);
-    std::vector<std::uint8_t> outside(scene.q.size(), 0);
+    if (run % 3 == 2)
+    {
+      scene.outside.assign(scene.q.size(), 0);
+    }
     const int wall = run % 3 == 0 ? n : 2;
     for (std::size_t i = 0; i < scene.q.size(); ++i)
     {
       const int x = static_cast<int>(i % static_cast<std::size_t>(n));
       scene.D[i] = x == wall && run % 3 == 1 ? 0. : std::pow(10., -contrast * uniform(random));
-      outside[i] = x == wall && run % 3 == 2;
+      if (!scene.outside.empty())
+      {
+        scene.outside[i] = x == wall;
+      }
       scene.sigma_a[i] = x > wall ? 0.1 : 0.; // of the other room
     }
     scene.q[0] = 1.;
     scene.q[1 + static_cast<std::size_t>(n) * (scene.q.size() / static_cast<std::size_t>(n) - 1)] =
       -1.;
-    DiffusionMedium<double> medium = scene.medium();
-    medium.outside = outside.data();
-    if (run % 3 != 2)
-    {
-      medium.outside = nullptr;
-    }
     DiffusionSolver solver;
-    solver.setMedium(medium);
+    solver.setMedium(scene.medium());
     DiffusionControl control;
     control.maxIterations = 50;
     const DiffusionReport report = solver.solveSteady(scene.q.data(), scene.phi.data(), control);
@@ -669,7 +628,7 @@ void notFinite(Suite& suite)
       DiffusionScene scene({ { 12, 12, 12 } }, { { 1., 1., 1. } });
       scene.sigma_a.assign(scene.q.size(), 1e-2);
       scene.D[5] = kind == 5 ? 1. : 0.3; // 5: constant
-      scene.q[index(scene, 5, 6, 7)] = 1.;
+      scene.q[scene.index(5, 6, 7)] = 1.;
       DiffusionSolver solver;
       FirstMomentSolver moment;
       solver.setMedium(scene.medium());

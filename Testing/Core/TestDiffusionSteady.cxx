@@ -173,11 +173,11 @@ void pointSource(Suite& suite)
     scene.D.assign(scene.D.size(), D);
     scene.sigma_a.assign(scene.D.size(), sigma);
     const int c = n / 2;
-    scene.q[static_cast<std::size_t>(scene.grid.index(c, c, c))] = 1. / (h * h * h);
+    scene.q[scene.index(c, c, c)] = 1. / (h * h * h);
     LT_CHECK(suite, scene.solve().reason == StopReason::Converged);
     // along an axis and along a diagonal of a face, in the mean: less of the grid's direction
     const int steps = static_cast<int>(std::lround(r * perUnit));
-    return scene.phi[static_cast<std::size_t>(scene.grid.index(c + steps, c, c))];
+    return scene.phi[scene.index(c + steps, c, c)];
   };
   const double coarse = fluence(8, 1.);
   const double fine = fluence(16, 1.);
@@ -204,8 +204,8 @@ void invariants(Suite& suite)
   DiffusionScene a = base;
   DiffusionScene b = base;
   DiffusionScene both = base;
-  a.q[static_cast<std::size_t>(a.grid.index(4, 5, 6))] = 1.;
-  b.q[static_cast<std::size_t>(a.grid.index(13, 3, 2))] = -0.7;
+  a.q[a.index(4, 5, 6)] = 1.;
+  b.q[a.index(13, 3, 2)] = -0.7;
   for (std::size_t i = 0; i < base.q.size(); ++i)
   {
     both.q[i] = 3. * a.q[i] + b.q[i];

@@ -13,6 +13,8 @@
 using namespace lighttransport;
 using lighttransport::testing::CollocatedMoments;
 using lighttransport::testing::DiffusionScene;
+using lighttransport::testing::Largest;
+using lighttransport::testing::LargestDifference;
 using lighttransport::testing::Suite;
 using lighttransport::testing::ThreadedFor;
 
@@ -20,26 +22,6 @@ namespace
 {
 const double V = 1. / std::sqrt(3.); // the speed, in units of c
 const double* const NoSource = nullptr;
-
-double largestOf(const std::vector<double>& values)
-{
-  double largest = 0.;
-  for (const double v : values)
-  {
-    largest = std::max(largest, std::abs(v));
-  }
-  return largest;
-}
-
-double worstDifference(const std::vector<double>& a, const std::vector<double>& b)
-{
-  double worst = 0.;
-  for (std::size_t i = 0; i < a.size(); ++i)
-  {
-    worst = std::max(worst, std::abs(a[i] - b[i]));
-  }
-  return worst;
-}
 
 /** A medium with sigma_a = sigma_t' = sigma, between mirrors. */
 DiffusionScene evenLosses(std::array<int, 3> dims, double h, double sigma)
@@ -398,15 +380,14 @@ void steadyState(Suite& suite)
     DiffusionScene scene = randomScene(3, { { 9, 8, 7 } }, 1.);
     scene.boundary = boundary;
     scene.refractiveIndexRatio = 1.4;
-    std::vector<std::uint8_t> outside(scene.phi.size(), 0);
-    for (std::size_t i = 0; i < outside.size(); i += 11)
+    scene.outside.assign(scene.phi.size(), 0);
+    for (std::size_t i = 0; i < scene.outside.size(); i += 11)
     {
-      outside[i] = i % 2 ? 1 : 0;
+      scene.outside[i] = i % 2 ? 1 : 0;
       scene.D[i] = i % 2 ? 1. : 0.;
       scene.q[i] = 0.;
     }
-    DiffusionMedium<double> medium = scene.medium();
-    medium.outside = outside.data();
+    const DiffusionMedium<double> medium = scene.medium();
     DiffusionSolver diffusion;
     diffusion.setMedium(medium);
     DiffusionControl control;
@@ -426,7 +407,7 @@ void steadyState(Suite& suite)
       std::cout << "steady state in " << report.iterations << " steps of " << cdt << ", residual "
                 << report.residual << "\n";
       LT_CHECK(suite, report.reason == StopReason::Converged && report.residual <= 1e-9);
-      LT_CHECK_NEAR(suite, worstDifference(scene.phi, steady) / largestOf(steady), 0., 1e-6);
+      LT_CHECK_NEAR(suite, LargestDifference(scene.phi, steady) / Largest(steady), 0., 1e-6);
       LT_CHECK_CLOSE(suite, report.emitted, expected.emitted, 1e-12);
       LT_CHECK_NEAR(suite, report.escaped, expected.escaped, 1e-6 * expected.emitted);
       LT_CHECK_NEAR(suite, report.absorbed, expected.absorbed, 1e-6 * expected.emitted);
@@ -434,7 +415,7 @@ void steadyState(Suite& suite)
       std::vector<double> fick(3 * steady.size());
       solver.flux(scene.phi.data(), E.data());
       diffusion.flux(steady.data(), fick.data());
-      LT_CHECK_NEAR(suite, worstDifference(E, fick) / largestOf(fick), 0., 1e-6);
+      LT_CHECK_NEAR(suite, LargestDifference(E, fick) / Largest(fick), 0., 1e-6);
     }
   }
 }
@@ -527,11 +508,11 @@ void bounds(Suite& suite)
       for (int i = 0; i < 100; ++i)
       {
         solver.step(NoSource, scene.phi.data(), 20, cdt, DiffusionControl());
-        largest = std::max(largest, largestOf(scene.phi));
+        largest = std::max(largest, Largest(scene.phi));
       }
       // the energy does not grow: no voxel holds more than all did at first
       LT_CHECK(suite, largest < std::sqrt(double(scene.phi.size())));
-      LT_CHECK(suite, largestOf(scene.phi) < 2.);
+      LT_CHECK(suite, Largest(scene.phi) < 2.);
     }
     const std::vector<double> before = scene.phi;
     const FirstMomentReport refused = solver.step(
@@ -593,7 +574,7 @@ void diffusionLimit(Suite& suite)
   std::vector<double> expected(scene.phi.size(), 0.);
   solver.step(scene.q.data(), scene.phi.data(), 100, cdt, DiffusionControl());
   diffusion.stepExplicit(scene.q.data(), expected.data(), 100, cdt, DiffusionControl());
-  LT_CHECK_NEAR(suite, worstDifference(scene.phi, expected) / largestOf(expected), 0., 1e-6);
+  LT_CHECK_NEAR(suite, LargestDifference(scene.phi, expected) / Largest(expected), 0., 1e-6);
 }
 
 /** A front that meets the partial-current border head on. */
@@ -651,10 +632,10 @@ void invariances(Suite& suite)
   const std::vector<double> phi = run(1., SerialFor, 1);
   LT_CHECK(suite, run(1., ThreadedFor(3), 1) == phi);
   LT_CHECK(suite, run(1., SerialFor, 24) == phi);
-  const double largest = largestOf(phi);
+  const double largest = Largest(phi);
   for (const double unit : { 1e-9, 1e9 })
   {
-    LT_CHECK_NEAR(suite, worstDifference(run(unit, SerialFor, 1), phi) / largest, 0., 1e-6);
+    LT_CHECK_NEAR(suite, LargestDifference(run(unit, SerialFor, 1), phi) / largest, 0., 1e-6);
   }
   // linear, either sign
   DiffusionScene negative = scene;
@@ -670,7 +651,7 @@ void invariances(Suite& suite)
   {
     p *= -0.5;
   }
-  LT_CHECK(suite, worstDifference(negative.phi, phi) <= 1e-14 * largest);
+  LT_CHECK(suite, LargestDifference(negative.phi, phi) <= 1e-14 * largest);
 }
 
 void conduct(Suite& suite)

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
 /**
- * A medium and its sources for tests of the diffusion core, and the operator
+ * A medium and its sources for tests and benchmarks of the diffusion core, and the operator
  * again, written as the equations say and independently of the solver.
  */
 #ifndef DiffusionScene_h
@@ -12,28 +12,63 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 namespace lighttransport
 {
 namespace testing
 {
-struct DiffusionScene
+/** What light moves through, and where it starts. */
+template <class T>
+struct MediumAndSource
 {
   Grid grid;
-  std::vector<double> D, sigma_a, q, phi;
+  std::vector<T> D, sigma_a, q;
+  std::vector<std::uint8_t> outside; ///< may be empty: nothing
   Boundary boundary = Boundary::Robin;
   double refractiveIndexRatio = 1.;
 
-  DiffusionScene(std::array<int, 3> dims, std::array<double, 3> spacing)
+  MediumAndSource(std::array<int, 3> dims, std::array<double, 3> spacing)
   {
     this->grid.dims = dims;
     this->grid.spacing = spacing;
     const std::size_t n = static_cast<std::size_t>(this->grid.size());
-    this->D.assign(n, 1.);
-    this->sigma_a.assign(n, 0.);
-    this->q.assign(n, 0.);
-    this->phi.assign(n, 0.);
+    this->D.assign(n, T(1));
+    this->sigma_a.assign(n, T(0));
+    this->q.assign(n, T(0));
+  }
+
+  std::size_t index(int i, int j, int k) const
+  {
+    return static_cast<std::size_t>(this->grid.index(i, j, k));
+  }
+
+  DiffusionMedium<T> medium() const
+  {
+    DiffusionMedium<T> m;
+    m.grid = this->grid;
+    m.D = this->D.data();
+    m.sigma_a = this->sigma_a.data();
+    m.outside = this->outside.empty() ? nullptr : this->outside.data();
+    m.boundary = this->boundary;
+    m.refractiveIndexRatio = this->refractiveIndexRatio;
+    return m;
+  }
+};
+
+struct DiffusionScene : MediumAndSource<double>
+{
+  std::vector<double> phi;
+
+  DiffusionScene(std::array<int, 3> dims, std::array<double, 3> spacing)
+    : DiffusionScene(MediumAndSource<double>(dims, spacing))
+  {
+  }
+  explicit DiffusionScene(MediumAndSource<double> scene)
+    : MediumAndSource<double>(std::move(scene))
+    , phi(this->q.size(), 0.)
+  {
   }
 
   using Function = std::function<double(double x, double y, double z)>;
@@ -54,17 +89,6 @@ struct DiffusionScene
     }
   }
 
-  DiffusionMedium<double> medium() const
-  {
-    DiffusionMedium<double> m;
-    m.grid = this->grid;
-    m.D = this->D.data();
-    m.sigma_a = this->sigma_a.data();
-    m.boundary = this->boundary;
-    m.refractiveIndexRatio = this->refractiveIndexRatio;
-    return m;
-  }
-
   DiffusionReport solve(double tolerance = 1e-10, const ParallelFor& parallelFor = SerialFor)
   {
     DiffusionSolver solver(parallelFor);
@@ -76,6 +100,12 @@ struct DiffusionScene
       report = solver.solveSteady(this->q.data(), this->phi.data(), control);
     }
     return report;
+  }
+
+  /** D, which is none outside. */
+  double conducts(std::size_t i) const
+  {
+    return !this->outside.empty() && this->outside[i] ? 0. : this->D[i];
   }
 
   /** |q - A phi| / |q|, with A as the equations have it. */
@@ -95,6 +125,7 @@ struct DiffusionScene
           const int at[3] = { i, j, k };
           const std::int64_t c = this->grid.index(i, j, k);
           const std::size_t ci = static_cast<std::size_t>(c);
+          const double D = this->conducts(ci);
           double r = this->q[ci] - this->sigma_a[ci] * this->phi[ci];
           for (int d = 0; d < 3; ++d)
           {
@@ -108,20 +139,20 @@ struct DiffusionScene
               if (at[d] + side >= 0 && at[d] + side < n[d])
               {
                 const std::size_t o = static_cast<std::size_t>(c + side * stride[d]);
-                const double sum = this->D[ci] + this->D[o];
-                const double Df = sum > 0. ? 2. * this->D[ci] * this->D[o] / sum : 0.;
+                const double sum = D + this->conducts(o);
+                const double Df = sum > 0. ? 2. * D * this->conducts(o) / sum : 0.;
                 r += Df * (this->phi[o] - this->phi[ci]) / (h * h);
               }
               else if (this->boundary == Boundary::Absorbing)
               {
-                r -= this->D[ci] * this->phi[ci] / (0.5 * h) / h;
+                r -= D * this->phi[ci] / (0.5 * h) / h;
               }
               else if (this->boundary == Boundary::Robin)
               {
                 // phi_face = u phi / (1 + u) from continuity of the current, d = h/2; u may be huge
-                const double u = 2. * A * this->D[ci] / (0.5 * h);
+                const double u = 2. * A * D / (0.5 * h);
                 const double drop = this->phi[ci] / (1. + u);
-                r -= this->D[ci] * drop / (0.5 * h) / h;
+                r -= D * drop / (0.5 * h) / h;
               }
             }
           }
@@ -146,6 +177,40 @@ struct DiffusionScene
     return e;
   }
 };
+
+inline double Largest(const std::vector<double>& values)
+{
+  double most = 0.;
+  for (const double v : values)
+  {
+    most = std::max(most, std::abs(v));
+  }
+  return most;
+}
+
+inline double LargestDifference(const std::vector<double>& a, const std::vector<double>& b)
+{
+  double most = 0.;
+  for (std::size_t i = 0; i < a.size(); ++i)
+  {
+    most = std::max(most, std::abs(a[i] - b[i]));
+  }
+  return most;
+}
+
+/** |phi - exact| / |exact|, of Euclid's norm; |phi| where nothing is to be. */
+inline double RelativeL2(const std::vector<double>& phi, const std::vector<double>& exact)
+{
+  double wrong = 0.;
+  double all = 0.;
+  for (std::size_t i = 0; i < phi.size(); ++i)
+  {
+    wrong += (phi[i] - exact[i]) * (phi[i] - exact[i]);
+    all += exact[i] * exact[i];
+  }
+  return all > 0. ? std::sqrt(wrong / all) : std::sqrt(wrong);
+}
+
 /** 95th percentile of |phi - exact| / |exact| within six decades of the largest. */
 inline double Percentile95(const std::vector<double>& phi, const std::vector<double>& exact)
 {
