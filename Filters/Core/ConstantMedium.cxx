@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 namespace lighttransport
 {
@@ -82,6 +84,50 @@ void divide(int n, const double* LIGHTTRANSPORT_RESTRICT base, double eigenvalue
     const double d = base[i] + eigenvalue;
     x[i] = d > 0. ? x[i] / d : 0.;
   }
+}
+
+/** x *= S_N of the eigenvalue base + eigenvalue; answers the sum of squares of R^N x */
+LIGHTTRANSPORT_SIMD
+double stepOn(int n, const double* LIGHTTRANSPORT_RESTRICT base, double eigenvalue,
+  const ConstantMedium::Steps& steps, double* LIGHTTRANSPORT_RESTRICT x)
+{
+  double R[Columns], first[Columns], power[Columns], sum[Columns];
+  for (int i = 0; i < n; ++i)
+  {
+    const double lambda = base[i] + eigenvalue;
+    const double inverse = 1. / (lambda + steps.shift);
+    const double rho = steps.shift * inverse;
+    R[i] = rho * (1. - steps.ahead * lambda * inverse);
+    first[i] = (1. + steps.ahead * rho) * inverse;
+    power[i] = 1.;
+    sum[i] = 0.;
+  }
+  std::int64_t bit = 1;
+  while (bit <= steps.count / 2)
+  {
+    bit *= 2;
+  }
+  for (; bit > 0; bit /= 2)
+  {
+    for (int i = 0; i < n; ++i)
+    {
+      sum[i] *= 1. + power[i];
+      power[i] *= power[i];
+    }
+    for (int i = 0; steps.count & bit && i < n; ++i)
+    {
+      sum[i] = sum[i] * R[i] + first[i];
+      power[i] *= R[i];
+    }
+  }
+  double squares = 0.;
+  for (int i = 0; i < n; ++i)
+  {
+    const double rest = power[i] * x[i];
+    squares += rest * rest;
+    x[i] *= sum[i];
+  }
+  return squares;
 }
 
 /**
@@ -386,8 +432,21 @@ void ConstantMedium::alongColumns(
   }
 }
 
-void ConstantMedium::throughPlanes(double* x, std::int64_t first, int columns) const
+double ConstantMedium::throughPlanes(
+  double* x, const Steps* steps, std::int64_t first, int columns) const
 {
+  double squares = 0.;
+  const auto scale = [&](const double* base, double eigenvalue, double* values)
+  {
+    if (steps)
+    {
+      squares += stepOn(columns, base, eigenvalue, *steps, values);
+    }
+    else
+    {
+      divide(columns, base, eigenvalue, values);
+    }
+  };
   const Axis& axis = this->axes[2];
   const int nx = this->axes[0].n;
   const std::int64_t plane = static_cast<std::int64_t>(nx) * this->axes[1].n;
@@ -401,23 +460,43 @@ void ConstantMedium::throughPlanes(double* x, std::int64_t first, int columns) c
   }
   if (axis.n == 1)
   {
-    divide(columns, room.row, 0., x + first);
-    return;
+    scale(room.row, 0., x + first);
+    return squares;
   }
   this->toHalves(axis, x + first, plane, columns, room.in);
   this->transform(axis, room.in, columns, true, room.out);
   for (int m = 0; m < axis.n; ++m)
   {
     const int even = axis.half[0].count;
-    divide(columns, room.row, axis.eigenvalues[static_cast<std::size_t>(m)],
+    scale(room.row, axis.eigenvalues[static_cast<std::size_t>(m)],
       room.out + (m < even ? m : axis.half[0].padded + m - even) * Columns);
   }
   this->transform(axis, room.out, columns, false, room.in);
   this->fromHalves(axis, room.in, columns, x + first, plane);
+  return squares;
 }
 
-bool ConstantMedium::solve(
-  double* x, const ParallelFor& parallelFor, const std::function<bool(double done)>& goOn) const
+double ConstantMedium::growth(const Steps& steps) const
+{
+  double least = this->sigma_a;
+  for (const Axis& axis : this->axes)
+  {
+    least += axis.eigenvalues.empty()
+      ? 0.
+      : *std::min_element(axis.eigenvalues.begin(), axis.eigenvalues.end());
+  }
+  const double diagonal = least + steps.shift;
+  if (!(diagonal > 1e-280))
+  {
+    return std::numeric_limits<double>::infinity(); // as good as
+  }
+  // (1 + R + ..) S_1 with R <= shift / diagonal
+  const double terms = diagonal / std::max(least, 1e-16 * diagonal);
+  return std::min(static_cast<double>(steps.count), terms) * (1. + steps.ahead) / diagonal;
+}
+
+bool ConstantMedium::solve(double* x, const Steps* steps, const ParallelFor& parallelFor,
+  const std::function<bool(double done)>& goOn, double* rest) const
 {
   const std::int64_t nx = this->axes[0].n;
   const std::int64_t ny = this->axes[1].n;
@@ -443,12 +522,17 @@ bool ConstantMedium::solve(
     }
   };
   const std::int64_t tiles = (plane + Columns - 1) / Columns;
+  std::vector<double> squares(static_cast<std::size_t>(steps ? tiles : 0));
   const auto columns = [&](std::int64_t begin, std::int64_t end)
   {
     for (std::int64_t t = begin; t < end; ++t)
     {
-      this->throughPlanes(
-        x, t * Columns, static_cast<int>(std::min<std::int64_t>(Columns, plane - t * Columns)));
+      const double sum = this->throughPlanes(x, steps, t * Columns,
+        static_cast<int>(std::min<std::int64_t>(Columns, plane - t * Columns)));
+      if (steps)
+      {
+        squares[static_cast<std::size_t>(t)] = sum;
+      }
     }
   };
   for (int step = 0; step < 3; ++step)
@@ -477,6 +561,10 @@ bool ConstantMedium::solve(
         return false;
       }
     }
+  }
+  if (rest)
+  {
+    *rest = std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.));
   }
   return true;
 }

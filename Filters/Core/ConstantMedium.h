@@ -1,13 +1,22 @@
 // SPDX-FileCopyrightText: The LightTransport authors
 // SPDX-License-Identifier: BSD-3-Clause
 /**
- * Steady diffusion in a constant medium, solved at once: with D and sigma_a the same in every
- * voxel the operator is a sum over the axes,
+ * Diffusion in a constant medium, steady or in implicit steps, solved at once: with D and sigma_a
+ * the same in every voxel the operator is a sum over the axes,
  *
  *   A = D (T_x + T_y + T_z) + sigma_a,
  *
  * T_d acting along axis d alone. Its eigenvectors are products of the T_d's (Lynch, Rice and
  * Thomas 1964, Numer. Math. 6, 185), and phi = V (V' q / eigenvalues), an axis at a time.
+ *
+ * An implicit step multiplies what is missing to the steady state by R(lambda) along each
+ * eigenvector, N steps by R^N: all of them are one look at the eigenvalues,
+ *
+ *   phi_N = phi_0 + V (S_N V' (q - A phi_0)),  S_N = (1 - R^N) / lambda = (1 + R + .. + R^(N-1))
+ * S_1,
+ *
+ * with rho = shift / (lambda + shift), R = rho (1 - ahead (1 - rho)) and
+ * S_1 = (1 + ahead rho) / (lambda + shift), which need no lambda above 0; R^N and S_N by doubling.
  *
  * T_d is tridiagonal, 2 on the diagonal and -1 beside it over h^2, and ends in 1 + kappa instead
  * of 2: kappa = h^2 times the border's conductance per D, 0 at a mirror, 2 where phi = 0 in the
@@ -17,7 +26,7 @@
  *
  * Steps of solve():
  *   1. every plane: along x, then along y
- *   2. every column of planes: along z, division by the eigenvalues, back along z
+ *   2. every column of planes: along z, division by the eigenvalues (or times S_N), back along z
  *   3. every plane: back along y, then along x
  * A transform is a product with two dense matrices of half the axis's length, one for the even
  * and one for the odd part: 2 sum(n_d) operations per voxel for both ways.
@@ -55,7 +64,29 @@ public:
    * neither.
    */
   bool solve(
-    double* x, const ParallelFor& parallelFor, const std::function<bool(double done)>& goOn) const;
+    double* x, const ParallelFor& parallelFor, const std::function<bool(double done)>& goOn) const
+  {
+    return this->solve(x, nullptr, parallelFor, goOn, nullptr);
+  }
+
+  /** Implicit time steps, backward Euler or SDIRK2. */
+  struct Steps
+  {
+    std::int64_t count = 1; ///< >= 1
+    double shift = 1.;      ///< 1 / (c dt) of a solve, > 0, in the unit of D / length^2
+    double ahead = 0.;      ///< SDIRK2: how far the second solve starts ahead, (1 - gamma) / gamma
+  };
+  /**
+   * x = S_N x: what the steps add, where x was q - A phi. `rest` becomes the Euclidean norm of
+   * R^N x, what the steps leave of that; the rest is as in solve.
+   */
+  bool march(double* x, const Steps& steps, const ParallelFor& parallelFor,
+    const std::function<bool(double done)>& goOn, double& rest) const
+  {
+    return this->solve(x, &steps, parallelFor, goOn, &rest);
+  }
+  /** By how much steps can lengthen x at most: S_N of the smallest eigenvalue, or a little more. */
+  double growth(const Steps& steps) const;
 
   std::int64_t bytes() const;
 
@@ -78,12 +109,14 @@ private:
         static_cast<std::size_t>(this->half[1].padded);
     }
   };
+  bool solve(double* x, const Steps* steps, const ParallelFor& parallelFor,
+    const std::function<bool(double done)>& goOn, double* rest) const;
   /** Along the first axis of some rows, in place; modes stand where voxels did. */
   void alongRows(const Axis& axis, double* x, std::int64_t rows, bool forward) const;
   /** Along the second axis of a plane, whose rows are `stride` long. */
   void alongColumns(const Axis& axis, double* x, std::int64_t stride, bool forward) const;
-  /** Step 2 of some columns from `first` on. */
-  void throughPlanes(double* x, std::int64_t first, int columns) const;
+  /** Step 2 of some columns from `first` on; answers the sum of squares of R^N x. */
+  double throughPlanes(double* x, const Steps* steps, std::int64_t first, int columns) const;
   /** The even and odd part of a block of columns, and a block from these. */
   void toHalves(
     const Axis& axis, const double* x, std::int64_t stride, int columns, double* to) const;

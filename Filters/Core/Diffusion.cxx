@@ -2071,6 +2071,34 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
 }
 
 template <class T>
+void DiffusionSolver::residualOfConstant(
+  const RightHandSide<T>& b, const double* phi, double* x) const
+{
+  ForEachRow(this->A, this->parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
+    {
+      b.row(o, n, x + o);
+      if (phi)
+      {
+        static thread_local std::vector<double> store;
+        store.resize(static_cast<std::size_t>(n));
+        if (this->floatMedium.D)
+        {
+          this->applyExactly(this->floatMedium, phi, row, o, n, store.data());
+        }
+        else
+        {
+          this->applyExactly(this->doubleMedium, phi, row, o, n, store.data());
+        }
+        for (int i = 0; i < n; ++i)
+        {
+          x[o + i] -= store[static_cast<std::size_t>(i)];
+        }
+      }
+    });
+}
+
+template <class T>
 void DiffusionSolver::solveConstant(
   const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
 {
@@ -2113,29 +2141,7 @@ void DiffusionSolver::solveConstant(
       return;
     }
     // 1. x = b - A phi, in double
-    SumEachRow(this->A, this->parallelFor,
-      [&](std::int64_t row, std::int64_t o, int n)
-      {
-        b.row(o, n, x.data() + o);
-        if (!dark || report.iterations > 0)
-        {
-          static thread_local std::vector<double> store;
-          store.resize(static_cast<std::size_t>(n));
-          if (this->floatMedium.D)
-          {
-            this->applyExactly(this->floatMedium, phi, row, o, n, store.data());
-          }
-          else
-          {
-            this->applyExactly(this->doubleMedium, phi, row, o, n, store.data());
-          }
-          for (int i = 0; i < n; ++i)
-          {
-            x[o + i] -= store[static_cast<std::size_t>(i)];
-          }
-        }
-        return 0.;
-      });
+    this->residualOfConstant(b, dark && report.iterations == 0 ? nullptr : phi, x.data());
     // 2. x = A^-1 x
     this->constant.solve(x.data(), this->parallelFor,
       [&](double done)
@@ -3009,6 +3015,14 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
     return;
   }
   report.residual = -1.;
+  if (this->isConstant && steps > 0)
+  {
+    const RightHandSide<T> exact{ q, 1. / this->scale, false };
+    const ConstantMedium::Steps all{ steps, shifted, stages == 2 ? (1. - gamma) / gamma : 0. };
+    this->marchConstant(exact, phi, all, control, report);
+    this->balance(q, phi, report);
+    return;
+  }
   const RightHandSide<T> steady{ q, 1. / this->scale, true };
   const double qNorm = this->norm(steady);
   this->setShift(shifted);
@@ -3102,6 +3116,113 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
   const double last = this->residual<T>(steady, phi, nullptr, 1.);
   report.residual = qNorm > 0. ? last / qNorm : last;
   this->balance(q, phi, report);
+}
+
+template <class T>
+void DiffusionSolver::marchConstant(const RightHandSide<T>& b, double* phi,
+  const ConstantMedium::Steps& steps, const DiffusionControl& control, DiffusionReport& report)
+{
+  Showing show(control);
+  this->parallelFor.tell(0.);
+  const double bNorm = this->norm(b);
+  const double goal = control.tolerance * bNorm;
+  const bool dark = this->isZero(phi);
+  double rNorm = dark || !std::isfinite(bNorm) ? bNorm : this->residual<T>(b, phi, nullptr, 1.);
+  report.fineApplications += dark ? 0. : 1.;
+  const auto stop = [&](StopReason reason, const char* message)
+  {
+    report.residual = bNorm > 0. ? rNorm / bNorm : rNorm;
+    report.reason = reason;
+    report.message = message;
+  };
+  if (!std::isfinite(rNorm))
+  {
+    stop(StopReason::NotFinite,
+      std::isfinite(bNorm) ? "the field to start from is not finite" : "the source is not finite");
+    return;
+  }
+  if (rNorm <= goal)
+  {
+    stop(StopReason::Converged, "");
+    return;
+  }
+  const double growth = this->constant.growth(steps);
+  Buffer<double> x(this->box.size());
+  report.bytes = std::max(report.bytes, this->bytesHeld() + 2 * x.bytes()); // and phi
+  for (;;)
+  {
+    if (report.iterations >= control.maxIterations)
+    {
+      stop(StopReason::Breakdown, "the steps have used up their iterations");
+      return;
+    }
+    if (!(rNorm < 1e300 / std::max(growth, 1.)))
+    {
+      stop(StopReason::NotFinite, "the field grows beyond what double precision holds");
+      return;
+    }
+    // 1. x = what the steps add
+    this->residualOfConstant(b, dark && report.iterations == 0 ? nullptr : phi, x.data());
+    double rest = 0.;
+    this->constant.march(
+      x.data(), steps, this->parallelFor,
+      [&](double done)
+      {
+        this->parallelFor.tell(done);
+        if (control.progress && !control.progress(done))
+        {
+          throw Interrupted();
+        }
+        return true;
+      },
+      rest);
+    Touch(phi, this->box.size(), this->parallelFor);
+    // 2. phi += x
+    const auto add = [&](double sign)
+    {
+      ForEachRow(this->A, this->parallelFor.whole(),
+        [&](std::int64_t, std::int64_t o, int n)
+        {
+          for (std::int64_t i = o; i < o + n; ++i)
+          {
+            phi[i] += sign * x[i];
+          }
+        });
+    };
+    add(1.);
+    const double last = rNorm;
+    rNorm = this->residual<T>(b, phi, nullptr, 1.);
+    report.fineApplications += 1.;
+    ++report.iterations;
+    if (!std::isfinite(rNorm))
+    {
+      stop(StopReason::NotFinite, "");
+      return;
+    }
+    show(phi);
+    if (rNorm <= goal)
+    {
+      stop(StopReason::Converged, "");
+      return;
+    }
+    if (rest > 0.5 * goal)
+    {
+      stop(StopReason::MaxIterations, ""); // all steps are made
+      return;
+    }
+    // 3. The steps end in the steady state, but for rounding: as many again take that away.
+    if (report.iterations > 1 && rNorm > 0.5 * last)
+    {
+      if (rNorm > last)
+      {
+        add(-1.);
+        rNorm = last;
+      }
+      stop(StopReason::Breakdown, "the tolerance is below what double precision reaches here");
+      return;
+    }
+    stop(StopReason::MaxIterations, ""); // where it is cancelled
+  }
 }
 
 //------------------------------------------------------------------------------

@@ -95,8 +95,8 @@ struct DiffusionReport
   int iterations = 0;
   /**
    * |b - A phi| / |b|, recomputed in double from phi and the medium; in time: of the steady
-   * equation with the float faces that the steps use. After Cancelled that of the last iteration
-   * or step, not recomputed; negative where there was none.
+   * equation, with the float faces where the steps use these. After Cancelled that of the last
+   * iteration or step, not recomputed; negative where there was none.
    */
   double residual = 0.;
   double seconds = 0.;    ///< this call, the set-up that it needed included
@@ -225,6 +225,8 @@ public:
    * forward Euler, whose positivity and stability bounds are below, or those of
    * control.implicitScheme, each to `tolerance`. q may be null: none.
    * MaxIterations says that all steps were made, Converged that the steady state came first.
+   * Where D and sigma_a are constant and nothing is outside, all implicit steps are made at once by
+   * ConstantMedium, in the time of one steady solve, to double's rounding.
    * On half a million voxels or more, explicit steps go through the memory four at a time, with
    * the same result; convergence and progress are then asked for after each four.
    */
@@ -332,6 +334,13 @@ private:
   template <class T>
   void solveConstant(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
     DiffusionReport& report);
+  /** x = b - A phi from the medium itself. */
+  template <class T>
+  void residualOfConstant(const RightHandSide<T>& b, const double* phi, double* x) const;
+  /** All steps of stepImplicit at once; b is the steady equation's. */
+  template <class T>
+  void marchConstant(const RightHandSide<T>& b, double* phi, const ConstantMedium::Steps& steps,
+    const DiffusionControl& control, DiffusionReport& report);
   /** 1 or -1 where all sources are of that sign, and so is the exact answer; else 0. */
   template <class T>
   int signOf(const RightHandSide<T>& b) const;

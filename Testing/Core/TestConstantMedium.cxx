@@ -143,13 +143,191 @@ void iterations(Suite& suite)
       direct.stepExplicit(scene.q.data(), one.data(), 3, direct.positivityBound(), control);
       iterative.stepExplicit(scene.q.data(), other.data(), 3, direct.positivityBound(), control);
       LT_CHECK_NEAR(suite, LargestDifference(one, other) / Largest(other), 0., 1e-9);
-      direct.stepImplicit(scene.q.data(), one.data(), 2, 10., control);
-      iterative.stepImplicit(scene.q.data(), other.data(), 2, 10., control);
-      LT_CHECK_NEAR(suite, LargestDifference(one, other) / Largest(other), 0., 1e-9);
+      for (const ImplicitScheme scheme :
+        { ImplicitScheme::BackwardEuler, ImplicitScheme::SecondOrder })
+      {
+        control.implicitScheme = scheme;
+        direct.stepImplicit(scene.q.data(), one.data(), 5, 10., control);
+        iterative.stepImplicit(scene.q.data(), other.data(), 5, 10., control);
+        LT_CHECK_NEAR(
+          suite, LargestDifference(one, other) / Largest(other), 0., 1e-6); // float faces
+      }
       const DiffusionReport again = direct.solveSteady(scene.q.data(), one.data(), control);
       LT_CHECK(suite, again.reason == StopReason::Converged);
       LT_CHECK_NEAR(suite, LargestDifference(one, region) / Largest(region), 0., 1e-11);
     }
+  }
+}
+
+/** Implicit steps, all at once: each solves its equation, N are N, and they end where light does.
+ */
+void steps(Suite& suite)
+{
+  const double gamma = 1. - std::sqrt(0.5);
+  const auto difference = [](const std::vector<double>& a, const std::vector<double>& b)
+  { return LargestDifference(a, b) / Largest(b); };
+  DiffusionControl control;
+  control.tolerance = 1e-13;
+  double worst = 0.;
+  for (const Boundary boundary : Boundaries)
+  {
+    for (const std::array<int, 3>& dims : { std::array<int, 3>{ { 1, 1, 1 } },
+           std::array<int, 3>{ { 1, 40, 1 } }, std::array<int, 3>{ { 23, 20, 18 } } })
+    {
+      for (const double cdt : { 1e-3, 1., 1e4 })
+      {
+        DiffusionScene scene = sceneOf(dims, { { 1., 0.7, 1.9 } }, boundary);
+        for (std::size_t i = 0; i < scene.phi.size(); ++i)
+        {
+          scene.phi[i] = scene.q[scene.q.size() - 1 - i];
+        }
+        DiffusionSolver solver;
+        solver.setMedium(scene.medium());
+        const auto march = [&](std::vector<double> phi, ImplicitScheme scheme, int count, double by)
+        {
+          control.implicitScheme = scheme;
+          solver.stepImplicit(scene.q.data(), phi.data(), count, by, control);
+          return phi;
+        };
+        // backward Euler against its equation, written as a steady one with 1 / (c dt) more to
+        // absorb
+        const auto euler = [&](const std::vector<double>& from, double by)
+        {
+          DiffusionScene step = scene;
+          step.phi = march(from, ImplicitScheme::BackwardEuler, 1, by);
+          for (std::size_t i = 0; i < from.size(); ++i)
+          {
+            step.sigma_a[i] += 1. / by;
+            step.q[i] += from[i] / by;
+          }
+          worst = std::max(worst, step.residual());
+          return step.phi;
+        };
+        // SDIRK2 is two of these
+        std::vector<double> first = euler(scene.phi, gamma * cdt);
+        for (std::size_t i = 0; i < first.size(); ++i)
+        {
+          first[i] = scene.phi[i] + (1. - gamma) / gamma * (first[i] - scene.phi[i]);
+        }
+        LT_CHECK_NEAR(suite,
+          difference(
+            march(scene.phi, ImplicitScheme::SecondOrder, 1, cdt), euler(first, gamma * cdt)),
+          0., 1e-11);
+        for (const ImplicitScheme scheme :
+          { ImplicitScheme::BackwardEuler, ImplicitScheme::SecondOrder })
+        {
+          std::vector<double> singly = scene.phi;
+          for (int i = 0; i < 13; ++i)
+          {
+            singly = march(singly, scheme, 1, cdt);
+          }
+          LT_CHECK_NEAR(suite, difference(march(scene.phi, scheme, 13, cdt), singly), 0., 1e-11);
+        }
+      }
+    }
+  }
+  std::cout << "largest residual of a step " << worst << "\n";
+  LT_CHECK(suite, worst < 1e-12);
+
+  // closed form: a cosine between mirrors decays by the schemes' factors, and the mean, where
+  // nothing absorbs, grows by what is emitted
+  const int n = 40;
+  const double h = 0.3;
+  DiffusionScene scene = sceneOf({ { n, 6, 5 } }, { { h, 1., 1. } }, Boundary::ZeroFlux, 0.4, 0.);
+  scene.q.assign(scene.q.size(), 2.);
+  DiffusionSolver solver;
+  solver.setMedium(scene.medium());
+  const double pi = std::acos(-1.);
+  const double lambda = 0.4 * std::pow(2. * std::sin(1.5 * pi / n) / h, 2.);
+  const auto mode = [&](double x, double, double) { return std::cos(3. * pi * x / (n * h)); };
+  for (const double z : { 1e-6, 0.1, 3., 1e5 })
+  {
+    const double cdt = z / lambda;
+    for (const bool second : { false, true })
+    {
+      control.implicitScheme = second ? ImplicitScheme::SecondOrder : ImplicitScheme::BackwardEuler;
+      const double R = second ? (1. - (1. - 2. * gamma) * z) / ((1. + gamma * z) * (1. + gamma * z))
+                              : 1. / (1. + z);
+      scene.fill(scene.phi, mode);
+      const DiffusionReport report =
+        solver.stepImplicit(scene.q.data(), scene.phi.data(), 20, cdt, control);
+      LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.iterations == 1);
+      const double mean = 20. * cdt * 2.;
+      LT_CHECK_NEAR(suite,
+        scene.worst(
+          [&](double x, double y, double w) { return mean + std::pow(R, 20) * mode(x, y, w); }),
+        0., 1e-12 * (1. + mean));
+      LT_CHECK_CLOSE(suite, report.residual, 1., std::pow(R, 20) + 1e-9); // the mean is not steady
+    }
+  }
+
+  // the steady state, reached in many steps or in long ones; said so only where it is
+  DiffusionScene lit = sceneOf({ { 33, 32, 31 } }, { { 1., 1., 1. } }, Boundary::Robin);
+  for (double& q : lit.q)
+  {
+    q = std::abs(q);
+  }
+  DiffusionScene steady = lit;
+  steady.solve(1e-13);
+  solver.setMedium(lit.medium());
+  const double bound = solver.positivityBound();
+  control = DiffusionControl();
+  for (const bool second : { false, true })
+  {
+    control.implicitScheme = second ? ImplicitScheme::SecondOrder : ImplicitScheme::BackwardEuler;
+    for (const int length : { 10, 1000 })
+    {
+      control.tolerance = 1e-11;
+      const auto run = [&](int count)
+      {
+        lit.phi.assign(lit.phi.size(), 0.);
+        return solver.stepImplicit(lit.q.data(), lit.phi.data(), count, length * bound, control);
+      };
+      DiffusionReport report = run(2);
+      LT_CHECK(suite, report.reason == StopReason::MaxIterations && report.residual > 1e-5);
+      LT_CHECK(suite, *std::min_element(lit.phi.begin(), lit.phi.end()) > 0.);
+      report = run(100000 / length);
+      LT_CHECK(suite, report.reason == StopReason::Converged && report.residual <= 1e-11);
+      LT_CHECK_NEAR(suite, lit.residual(), report.residual, 1e-12);
+      LT_CHECK_NEAR(suite, difference(lit.phi, steady.phi), 0., 1e-9);
+      const std::vector<double> before = lit.phi;
+      report = solver.stepImplicit(lit.q.data(), lit.phi.data(), 7, length * bound, control);
+      LT_CHECK(suite, report.reason == StopReason::Converged && report.iterations == 0);
+      LT_CHECK(suite, lit.phi == before);
+      // more than double can give: by the reason, and the best there is
+      control.tolerance = 1e-19;
+      report = run(100000 / length);
+      LT_CHECK(suite, report.reason == StopReason::Breakdown && report.residual < 1e-12);
+      LT_CHECK_NEAR(suite, difference(lit.phi, steady.phi), 0., 1e-10);
+    }
+  }
+
+  // cancelled: the field before; what is held: phi and a value more; beyond double: said
+  control.tolerance = 1e-10;
+  lit.phi.assign(lit.phi.size(), 0.25);
+  const std::vector<double> before = lit.phi;
+  control.progress = [](double fraction) { return fraction < 0.5; };
+  DiffusionReport report = solver.stepImplicit(lit.q.data(), lit.phi.data(), 5, bound, control);
+  LT_CHECK(suite, report.reason == StopReason::Cancelled && lit.phi == before);
+  LT_CHECK(suite, report.residual < 0.);
+  control.progress = nullptr;
+  int shown = 0;
+  control.intermediate = [&](const double* phi) { shown += phi[0] != 0.25 ? 1 : 0; };
+  control.intermediateInterval = 0.;
+  report = solver.stepImplicit(lit.q.data(), lit.phi.data(), 5, bound, control);
+  LT_CHECK(suite, report.reason == StopReason::MaxIterations && shown == 1);
+  LT_CHECK(suite, report.bytes < 18 * lit.grid.size());
+  control.maxIterations = 0;
+  report = solver.stepImplicit(lit.q.data(), lit.phi.data(), 5, bound, control);
+  LT_CHECK(suite, report.reason == StopReason::Breakdown && !report.message.empty());
+  control.maxIterations = 5;
+  for (const double cdt : { 1e250, 1e305 })
+  {
+    scene.q.assign(scene.q.size(), 1e100);
+    scene.phi.assign(scene.phi.size(), 1.);
+    solver.setMedium(scene.medium());
+    report = solver.stepImplicit(scene.q.data(), scene.phi.data(), 5, cdt, control);
+    LT_CHECK(suite, report.reason == StopReason::NotFinite && scene.phi[0] == 1.);
   }
 }
 
@@ -292,6 +470,13 @@ void threads(Suite& suite)
   LT_CHECK(suite, one.solve(1e-8).reason == StopReason::Converged);
   three.solve(1e-8, lighttransport::testing::ThreadedFor(3));
   LT_CHECK(suite, one.phi == three.phi);
+  DiffusionSolver serial;
+  DiffusionSolver threaded(lighttransport::testing::ThreadedFor(3));
+  serial.setMedium(one.medium());
+  threaded.setMedium(three.medium());
+  serial.stepImplicit(one.q.data(), one.phi.data(), 7, 3., DiffusionControl());
+  threaded.stepImplicit(three.q.data(), three.phi.data(), 7, 3., DiffusionControl());
+  LT_CHECK(suite, one.phi == three.phi);
 }
 } // namespace
 
@@ -307,6 +492,7 @@ int main(int argc, char* argv[])
   equations(suite);
   eigenvectors(suite);
   iterations(suite);
+  steps(suite);
   reports(suite);
   extremes(suite);
   return suite.result();
