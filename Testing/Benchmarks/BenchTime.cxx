@@ -8,7 +8,7 @@
  * prints its numbers and leaves there, or in Testing/Temporary of its build, stability.csv (bounds
  * of r = c dt / h by the formulas and measured with the solvers' own steps), grid.csv (the thesis's
  * figure 3.6 and the staggered grid's answer) and front.csv (a front in 1-D), which bench-time.py
- * draws.
+ * draws. It also times implicit steps in a constant medium against iterations.
  */
 #include "CollocatedMoments.h"
 #include "Core/FirstMoment.h"
@@ -16,6 +16,7 @@
 #include "LightTransportTesting.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <iostream>
@@ -286,6 +287,56 @@ void front(const std::string& folder)
         << "\n";
   }
 }
+/** 20 implicit steps at 64^3 in a constant medium: all at once, and by iterations. */
+void implicitSteps()
+{
+  DiffusionScene scene = homogeneous(64, 0.5, 0.99);
+  scene.boundary = Boundary::Robin;
+  scene.q[static_cast<std::size_t>(scene.grid.index(20, 25, 30))] = 1.;
+  const std::vector<std::uint8_t> nothing(scene.q.size(), 0);
+  std::cout << "\n20 implicit steps in a constant medium, 64^3, one thread, medians of 9:\n"
+            << "scheme, c dt / positivity bound, s at once, s by iterations, ratio, difference\n";
+  for (const bool second : { false, true })
+  {
+    for (const double length : { 10., 1000. })
+    {
+      std::vector<double> fields[2];
+      double seconds[2];
+      for (std::size_t way = 0; way < 2; ++way)
+      {
+        DiffusionMedium<double> medium = scene.medium();
+        medium.outside = way == 1 ? nothing.data() : nullptr; // then none is taken for constant
+        DiffusionControl control;
+        control.implicitScheme =
+          second ? ImplicitScheme::SecondOrder : ImplicitScheme::BackwardEuler;
+        std::vector<double> times;
+        for (int i = 0; i < 9; ++i)
+        {
+          fields[way].assign(scene.q.size(), 0.);
+          const auto began = std::chrono::steady_clock::now();
+          DiffusionSolver solver;
+          solver.setMedium(medium);
+          solver.stepImplicit(
+            scene.q.data(), fields[way].data(), 20, length * solver.positivityBound(), control);
+          times.push_back(
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
+        }
+        std::sort(times.begin(), times.end());
+        seconds[way] = times[times.size() / 2];
+      }
+      double most = 0.;
+      double worst = 0.;
+      for (std::size_t i = 0; i < scene.q.size(); ++i)
+      {
+        most = std::max(most, fields[1][i]);
+        worst = std::max(worst, std::abs(fields[1][i] - fields[0][i]));
+      }
+      std::cout << (second ? "SDIRK2" : "backward Euler") << ", " << length << ", " << seconds[0]
+                << ", " << seconds[1] << ", " << seconds[1] / seconds[0] << ", " << worst / most
+                << "\n";
+    }
+  }
+}
 } // namespace
 
 int main(int argc, char* argv[])
@@ -294,5 +345,6 @@ int main(int argc, char* argv[])
   stability(folder);
   grid(folder);
   front(folder);
+  implicitSteps();
   return std::ofstream(folder + "/front.csv", std::ios::app).good() ? 0 : 1;
 }
