@@ -551,7 +551,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
 
   const auto began = std::chrono::steady_clock::now();
   // Told and asked while anything lasts: Interrupted where the answer is to stop.
-  const lighttransport::DiffusionProgress progress = [this](double fraction)
+  const lighttransport::ProgressFunction progress = [this](double fraction)
   {
     this->UpdateProgress(std::max(fraction, this->GetProgress()));
     return !vtkLightTransportCheckAbort(this);

@@ -15,6 +15,7 @@ namespace
 /** Sets are sought within bricks of the finest grid, and within so many rows of the others. */
 constexpr int Brick[3] = { 16, 8, 8 };
 constexpr std::int32_t RowsTogether = 1024;
+constexpr int FinestSweeps = 2; // before and after each coarse correction
 /** Gauss-Seidel goes along so many rows, see 5. in the header. */
 constexpr std::int32_t RowsInChunk = 8192;
 /** So many parts between two looks at the clock. */
@@ -731,7 +732,7 @@ void Aggregation::cycle(const DiffusionOperator& A, const float* b, float* x,
       to[row * nx + i] += from[i] >= 0 ? e[from[i]] : 0.f;
     }
   };
-  SmoothAround(A, this->sweeps, b, x, &correction, parallelFor, done);
+  SmoothAround(A, FinestSweeps, b, x, &correction, parallelFor, done);
 }
 
 namespace

@@ -52,9 +52,6 @@ public:
   void cycle(const DiffusionOperator& A, const float* b, float* x, const ParallelFor& parallelFor,
     const RowBody& done);
 
-  /** Smoothing sweeps before and after each coarse correction of the finest grid; default 2. */
-  int sweeps = 2;
-
   std::int64_t bytes() const;
   int numberOfLevels() const { return static_cast<int>(this->levels.size()) + 1; }
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <sstream>
 #include <type_traits>
@@ -40,11 +39,6 @@ inline float fitted(float t, int f)
     t = std::min(4.f * t * (1.f + 0.25f * t), 1e9f);
   }
   return 1.f + 0.7f * (std::min(product, 1e9f) - 1.f);
-}
-
-double now()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 /** to = from * factor, which is within float's range. */
@@ -199,7 +193,7 @@ void CoarseDiffusion::load(std::int64_t row, float* D, float* s) const
 //------------------------------------------------------------------------------
 template <class T>
 DiffusionReport CoarseDiffusion::setMedium(
-  const DiffusionMedium<T>& medium, int factor, bool inHaste, const DiffusionProgress& progress)
+  const DiffusionMedium<T>& medium, int factor, bool inHaste, const ProgressFunction& progress)
 {
   const WatchedFor::Asking asking(this->parallelFor, progress);
   const WatchedFor::Asking inner(this->solver.parallelFor, progress);
@@ -1519,7 +1513,7 @@ void CoarseDiffusion::balance(const Q* q, const double* phi, DiffusionReport& re
 
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
   template DiffusionReport CoarseDiffusion::setMedium<T>(                                          \
-    const DiffusionMedium<T>&, int, bool, const DiffusionProgress&);                               \
+    const DiffusionMedium<T>&, int, bool, const ProgressFunction&);                                \
   template DiffusionReport CoarseDiffusion::solve<T>(                                              \
     const T*, double*, const DiffusionControl&, bool);
 LIGHTTRANSPORT_INSTANTIATE(float)

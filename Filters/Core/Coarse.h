@@ -9,10 +9,11 @@
  *      h^2/D in series along each of the f^2 lines, these in parallel (no exchange between
  *      lines: a lower bound of the conductance), or the voxels of each layer in parallel, these
  *      in series (full exchange: an upper bound); three parts of the first, one of the second. A
- * border face is one end of such a network in series with the border's own resistance.
+ *      border face is one end of such a network in series with the border's own resistance.
  *   2. a sink counts by what light is left at its voxel: psi, what two sweeps of the full
  *      equations without source make of 1, relative to the best voxel of the cell (an absorbing
- *      wall keeps none of the light that falls on it).
+ *      wall keeps none of the light that falls on it); strong ones by more, so that light is
+ *      damped as much per length on cells as on voxels.
  *   3. a source is given to the eight cells around its voxel by the weights of 4.
  *   4. a voxel's phi is psi times the eight cells' around it, along each axis by the balance of
  *      flux on the line that joins their middles; then sweeps of the full grid's equations.
@@ -44,7 +45,7 @@ public:
    */
   template <class T>
   DiffusionReport setMedium(const DiffusionMedium<T>& medium, int factor, bool inHaste = false,
-    const DiffusionProgress& progress = {});
+    const ProgressFunction& progress = {});
 
   /**
    * phi: in, with fromPhi, the start; out, the answer reached. Without a named error or a time
@@ -59,7 +60,6 @@ public:
     const Q* q, double* phi, const DiffusionControl& control, bool fromPhi = false);
 
   const Grid& grid() const { return this->fine; }
-  const Grid& coarseGrid() const { return this->coarse; }
   std::int64_t bytes() const;
 
 private:

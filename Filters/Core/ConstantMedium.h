@@ -56,7 +56,6 @@ public:
    */
   void setup(const Grid& grid, double D, double sigma_a, const std::array<double, 3>& border);
   void release();
-  bool isReady() const { return !this->axes[0].eigenvalues.empty(); }
 
   /**
    * x = A^-1 x; where an eigenvalue is 0 (mirrors and no absorption), the part of x along it, its

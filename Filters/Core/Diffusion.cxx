@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -68,11 +67,6 @@ constexpr double ManyIterations = 24.;
 /** Of the aggregation: so much in all is allowed, per voxel; and so much however few they are. */
 constexpr std::int64_t AllowedBytes = 64;
 constexpr std::int64_t AllowedAnyhow = std::int64_t(1) << 24;
-
-double now()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 /** F_dr's integrand is smooth in the angle of refraction side of the critical angle. */
 double unpolarisedFresnel(double cosInside, double eta)
@@ -747,7 +741,7 @@ std::int64_t DiffusionSolver::bytesHeld() const
 //------------------------------------------------------------------------------
 template <class T>
 DiffusionReport DiffusionSolver::setMedium(
-  const DiffusionMedium<T>& medium, const DiffusionProgress& progress)
+  const DiffusionMedium<T>& medium, const ProgressFunction& progress)
 {
   return this->interruptible(progress,
     [&](DiffusionReport& report)
@@ -770,8 +764,7 @@ DiffusionReport DiffusionSolver::setMedium(
 }
 
 template <class Solve>
-DiffusionReport DiffusionSolver::interruptible(
-  const DiffusionProgress& progress, const Solve& solve)
+DiffusionReport DiffusionSolver::interruptible(const ProgressFunction& progress, const Solve& solve)
 {
   const double began = now();
   const WatchedFor::Asking asking(this->parallelFor, progress);
@@ -3346,50 +3339,37 @@ std::string DiffusionSolver::badStep(double cdt) const
 
 template <class T>
 DiffusionReport DiffusionSolver::stepExplicit(
-  const T* q, double* phi, int steps, double cdt, const DiffusionControl& control)
+  const T* q, SteppedField phi, int steps, double cdt, const DiffusionControl& control)
 {
-  return this->march(q, phi, nullptr, steps, cdt, false, control);
-}
-
-template <class T>
-DiffusionReport DiffusionSolver::stepExplicit(
-  const T* q, Buffer<double>& phi, int steps, double cdt, const DiffusionControl& control)
-{
-  return this->march(q, phi.data(), &phi, steps, cdt, false, control);
+  return this->march(q, phi, steps, cdt, false, control);
 }
 
 template <class T>
 DiffusionReport DiffusionSolver::stepLocal(
-  const T* q, double* phi, int steps, double courant, const DiffusionControl& control)
+  const T* q, SteppedField phi, int steps, double courant, const DiffusionControl& control)
 {
-  return this->march(q, phi, nullptr, steps, courant, true, control);
+  return this->march(q, phi, steps, courant, true, control);
 }
 
 template <class T>
-DiffusionReport DiffusionSolver::stepLocal(
-  const T* q, Buffer<double>& phi, int steps, double courant, const DiffusionControl& control)
-{
-  return this->march(q, phi.data(), &phi, steps, courant, true, control);
-}
-
-template <class T>
-DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* store, int steps,
-  double length, bool local, const DiffusionControl& control)
+DiffusionReport DiffusionSolver::march(const T* q, SteppedField field, int steps, double length,
+  bool local, const DiffusionControl& control)
 {
   Buffer<double> other;
-  double* fields[2] = { phi, nullptr };
+  double* fields[2] = { field.values, nullptr };
   int at = 0; // the field that phi's last state is in
   const auto keep = [&]
   {
-    if (at == 1 && store)
+    if (at == 1 && field.buffer)
     {
-      std::swap(*store, other);
+      std::swap(*field.buffer, other);
+      field.values = field.buffer->data();
     }
     else if (at == 1)
     {
       ForRows(this->parallelFor.whole(), this->box.size(), this->box.size(),
         [&](std::int64_t begin, std::int64_t end)
-        { std::copy(fields[1] + begin, fields[1] + end, phi + begin); });
+        { std::copy(fields[1] + begin, fields[1] + end, field.values + begin); });
     }
     at = 0;
   };
@@ -3422,7 +3402,7 @@ DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* 
       const double qNorm = this->norm(b);
       other.allocate(size);
       fields[1] = other.data();
-      Touch(phi, size, this->parallelFor);
+      Touch(field.values, size, this->parallelFor);
       Touch(other.data(), size, this->parallelFor);
       report.bytes =
         this->bytesHeld() + other.bytes() + size * static_cast<std::int64_t>(sizeof(double));
@@ -3506,10 +3486,9 @@ DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* 
         }
       }
       keep();
-      phi = store ? store->data() : phi;
-      const double last = this->residual<T>(b, phi, nullptr, 1.);
+      const double last = this->residual<T>(b, field.values, nullptr, 1.);
       report.residual = qNorm > 0. ? last / qNorm : last;
-      this->balance(q, phi, report);
+      this->balance(q, field.values, report);
     });
   keep(); // where it was cancelled
   return all;
@@ -3517,7 +3496,7 @@ DiffusionReport DiffusionSolver::march(const T* q, double* phi, Buffer<double>* 
 
 //------------------------------------------------------------------------------
 template <class T>
-bool DiffusionSolver::flux(const double* phi, T* E, const DiffusionProgress& progress) const
+bool DiffusionSolver::flux(const double* phi, T* E, const ProgressFunction& progress) const
 {
   const WatchedFor::Asking asking(this->parallelFor, progress);
   const std::array<int, 3>& m = this->volume.dims;
@@ -3585,7 +3564,7 @@ bool DiffusionSolver::flux(const double* phi, T* E, const DiffusionProgress& pro
 //------------------------------------------------------------------------------
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
   template DiffusionReport DiffusionSolver::setMedium<T>(                                          \
-    const DiffusionMedium<T>&, const DiffusionProgress&);                                          \
+    const DiffusionMedium<T>&, const ProgressFunction&);                                           \
   template DiffusionReport DiffusionSolver::solveActive<T, float>(                                 \
     const DiffusionMedium<T>&, const float*, double*, const DiffusionControl&, double);            \
   template DiffusionReport DiffusionSolver::solveActive<T, double>(                                \
@@ -3593,16 +3572,12 @@ bool DiffusionSolver::flux(const double* phi, T* E, const DiffusionProgress& pro
   template DiffusionReport DiffusionSolver::solveSteady<T>(                                        \
     const T*, double*, const DiffusionControl&);                                                   \
   template DiffusionReport DiffusionSolver::stepExplicit<T>(                                       \
-    const T*, double*, int, double, const DiffusionControl&);                                      \
+    const T*, SteppedField, int, double, const DiffusionControl&);                                 \
   template DiffusionReport DiffusionSolver::stepLocal<T>(                                          \
-    const T*, double*, int, double, const DiffusionControl&);                                      \
-  template DiffusionReport DiffusionSolver::stepExplicit<T>(                                       \
-    const T*, Buffer<double>&, int, double, const DiffusionControl&);                              \
-  template DiffusionReport DiffusionSolver::stepLocal<T>(                                          \
-    const T*, Buffer<double>&, int, double, const DiffusionControl&);                              \
+    const T*, SteppedField, int, double, const DiffusionControl&);                                 \
   template DiffusionReport DiffusionSolver::stepImplicit<T>(                                       \
     const T*, double*, int, double, const DiffusionControl&);                                      \
-  template bool DiffusionSolver::flux<T>(const double*, T*, const DiffusionProgress&) const;
+  template bool DiffusionSolver::flux<T>(const double*, T*, const ProgressFunction&) const;
 LIGHTTRANSPORT_INSTANTIATE(float)
 LIGHTTRANSPORT_INSTANTIATE(double)
 #undef LIGHTTRANSPORT_INSTANTIATE

@@ -110,9 +110,6 @@ struct DiffusionReport
   double activeFraction = 1.; ///< of the voxels that took part
 };
 
-/** Called between iterations with a fraction done in [0, 1]; false cancels. */
-using DiffusionProgress = std::function<bool(double fraction)>;
-
 /** How implicit steps go forward. Both are L-stable: what a large step cannot follow, it damps. */
 enum class ImplicitScheme
 {
@@ -125,7 +122,8 @@ struct DiffusionControl
   double tolerance = 1e-8;
   int maxIterations = 500;
   ImplicitScheme implicitScheme = ImplicitScheme::BackwardEuler;
-  DiffusionProgress progress; ///< may be empty; also called every 10 ms while passes run
+  /** May be empty; called between iterations and every 10 ms while passes run; false cancels. */
+  ProgressFunction progress;
   /**
    * Where above 0, the solve ends with Converged as soon as the estimated error (see
    * DiffusionReport) is at or below half of it, or the tolerance is met.
@@ -160,6 +158,22 @@ struct DiffusionControl
   std::function<double()> clock; ///< seconds, of the interval; empty: the system's steady clock
 };
 
+/** The phi of explicit steps. A Buffer may become another one: that spares a copy. */
+struct SteppedField
+{
+  SteppedField(double* phi)
+    : values(phi)
+  {
+  }
+  SteppedField(Buffer<double>& phi)
+    : values(phi.data())
+    , buffer(&phi)
+  {
+  }
+  double* values;
+  Buffer<double>* buffer = nullptr;
+};
+
 /** Calls control.intermediate when it is due. */
 class Showing
 {
@@ -175,8 +189,8 @@ private:
 };
 
 /**
- * Holds the operator of one medium, its multigrid hierarchy (made at the first
- * steady or implicit solve) and nothing else; sources and solutions are the
+ * Holds the operator of one medium, its hierarchies (made at the first steady or implicit
+ * solve; of a constant medium, its transforms) and nothing else; sources and solutions are the
  * caller's. Throws std::bad_alloc.
  */
 class DiffusionSolver
@@ -193,7 +207,7 @@ public:
    */
   template <class T>
   DiffusionReport setMedium(
-    const DiffusionMedium<T>& medium, const DiffusionProgress& progress = {});
+    const DiffusionMedium<T>& medium, const ProgressFunction& progress = {});
 
   /**
    * Steady state: conjugate gradients, preconditioned by one multigrid cycle,
@@ -232,14 +246,10 @@ public:
    */
   template <class T>
   DiffusionReport stepExplicit(
-    const T* q, double* phi, int steps, double cdt, const DiffusionControl& control);
+    const T* q, SteppedField phi, int steps, double cdt, const DiffusionControl& control);
   template <class T>
   DiffusionReport stepImplicit(
     const T* q, double* phi, int steps, double cdt, const DiffusionControl& control);
-  /** stepExplicit and stepLocal in a buffer, which may become another: that spares a copy. */
-  template <class T>
-  DiffusionReport stepExplicit(
-    const T* q, Buffer<double>& phi, int steps, double cdt, const DiffusionControl& control);
 
   /**
    * Explicit steps in which every voxel has its own c dt: the fraction `courant`, in (0, 1], of
@@ -249,10 +259,7 @@ public:
    */
   template <class T>
   DiffusionReport stepLocal(
-    const T* q, double* phi, int steps, double courant, const DiffusionControl& control);
-  template <class T>
-  DiffusionReport stepLocal(
-    const T* q, Buffer<double>& phi, int steps, double courant, const DiffusionControl& control);
+    const T* q, SteppedField phi, int steps, double courant, const DiffusionControl& control);
 
   /** c dt up to which a forward Euler step keeps positive fields positive: 1 / max diagonal. */
   double positivityBound() const;
@@ -264,7 +271,7 @@ public:
    * `progress` ended it.
    */
   template <class T>
-  bool flux(const double* phi, T* E, const DiffusionProgress& progress = {}) const;
+  bool flux(const double* phi, T* E, const ProgressFunction& progress = {}) const;
 
   const Grid& grid() const { return this->volume; }
 
@@ -273,7 +280,7 @@ private:
   friend class FirstMomentSolver;
   /** solve(report), its loops watched; Cancelled where they were interrupted. */
   template <class Solve>
-  DiffusionReport interruptible(const DiffusionProgress& progress, const Solve& solve);
+  DiffusionReport interruptible(const ProgressFunction& progress, const Solve& solve);
   template <class T>
   void steady(const T* q, double* phi, const DiffusionControl& control, DiffusionReport& report);
   template <class T, class Q>
@@ -375,13 +382,10 @@ private:
   double sumOf(const Term& term) const;
   template <class T>
   void balance(const T* q, const double* phi, DiffusionReport& report) const;
-  /**
-   * Of stepExplicit (c dt = step) and, where `local`, of stepLocal (step = courant). `store`: the
-   * buffer that phi is, or null.
-   */
+  /** Of stepExplicit (c dt = length) and, where `local`, of stepLocal (courant = length). */
   template <class T>
-  DiffusionReport march(const T* q, double* phi, Buffer<double>* store, int steps, double step,
-    bool local, const DiffusionControl& control);
+  DiffusionReport march(const T* q, SteppedField field, int steps, double length, bool local,
+    const DiffusionControl& control);
   /** Why a step is none; empty where it is one. */
   std::string badStep(double cdt) const;
   /** What walls close off without a sink, though sources in it cancel: its voxels. */

@@ -5,7 +5,6 @@
 #include "Core/Kernel.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <sstream>
 
@@ -13,11 +12,6 @@ namespace lighttransport
 {
 namespace
 {
-double now()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 /** E += relaxation (conductance (phi - next) - E) */
 LIGHTTRANSPORT_SIMD
 void relax(int n, const float* LIGHTTRANSPORT_RESTRICT conductance,
@@ -122,7 +116,7 @@ std::int64_t FirstMomentSolver::bytes() const
 //------------------------------------------------------------------------------
 template <class T>
 DiffusionReport FirstMomentSolver::setMedium(
-  const DiffusionMedium<T>& medium, const DiffusionProgress& progress)
+  const DiffusionMedium<T>& medium, const ProgressFunction& progress)
 {
   const double began = now();
   const WatchedFor::Asking asking(this->parallelFor, progress);
@@ -248,7 +242,7 @@ double FirstMomentSolver::courantBound() const
   return sum > 0. ? std::sqrt(3. / sum) : std::sqrt(3.) * this->box.smallestSpacing();
 }
 
-double FirstMomentSolver::stabilityBound(const DiffusionProgress& progress)
+double FirstMomentSolver::stabilityBound(const ProgressFunction& progress)
 {
   if (this->stability > 0.)
   {
@@ -671,7 +665,7 @@ void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
 
 //------------------------------------------------------------------------------
 template <class T>
-bool FirstMomentSolver::flux(const double* phi, T* E, const DiffusionProgress& progress) const
+bool FirstMomentSolver::flux(const double* phi, T* E, const ProgressFunction& progress) const
 {
   const WatchedFor::Asking asking(this->parallelFor, progress);
   const int nx = this->box.dims[0];
@@ -726,10 +720,10 @@ bool FirstMomentSolver::flux(const double* phi, T* E, const DiffusionProgress& p
 //------------------------------------------------------------------------------
 #define LIGHTTRANSPORT_INSTANTIATE(T)                                                              \
   template DiffusionReport FirstMomentSolver::setMedium<T>(                                        \
-    const DiffusionMedium<T>&, const DiffusionProgress&);                                          \
+    const DiffusionMedium<T>&, const ProgressFunction&);                                           \
   template FirstMomentReport FirstMomentSolver::step<T>(                                           \
     const T*, double*, int, double, const DiffusionControl&);                                      \
-  template bool FirstMomentSolver::flux<T>(const double*, T*, const DiffusionProgress&) const;
+  template bool FirstMomentSolver::flux<T>(const double*, T*, const ProgressFunction&) const;
 LIGHTTRANSPORT_INSTANTIATE(float)
 LIGHTTRANSPORT_INSTANTIATE(double)
 #undef LIGHTTRANSPORT_INSTANTIATE

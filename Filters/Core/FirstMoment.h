@@ -71,7 +71,7 @@ public:
   /** Reads the medium once, and sets E to 0. 56 bytes per voxel. Answers as DiffusionSolver's. */
   template <class T>
   DiffusionReport setMedium(
-    const DiffusionMedium<T>& medium, const DiffusionProgress& progress = {});
+    const DiffusionMedium<T>& medium, const ProgressFunction& progress = {});
 
   /**
    * Time steps of length c dt (a length, > 0, up to stabilityBound) from phi and the E that an
@@ -90,14 +90,14 @@ public:
   /** c dt at which a step goes as far as the wave: sqrt(3 / sum 1/h^2). Stable in any medium. */
   double courantBound() const;
   /** c dt up to which a step is stable in this medium; at least courantBound. 0: cancelled. */
-  double stabilityBound(const DiffusionProgress& progress = {});
+  double stabilityBound(const ProgressFunction& progress = {});
 
   /**
    * E at phi's time and the voxels' centres, along the grid's axes; 3 values per voxel. False where
    * `progress` ended it.
    */
   template <class T>
-  bool flux(const double* phi, T* E, const DiffusionProgress& progress = {}) const;
+  bool flux(const double* phi, T* E, const ProgressFunction& progress = {}) const;
 
   std::int64_t bytes() const;
   const Grid& grid() const { return this->box; }

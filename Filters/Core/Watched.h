@@ -18,6 +18,12 @@
 
 namespace lighttransport
 {
+/** Seconds, of a clock that only goes forward. */
+inline double now()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 /** What a watched loop throws where its caller is told to stop. */
 struct Interrupted
 {
@@ -32,11 +38,6 @@ class WatchedFor
     double fraction = 0.;
     double asked = 0.;
 
-    static double now()
-    {
-      using namespace std::chrono;
-      return duration<double>(steady_clock::now().time_since_epoch()).count();
-    }
     void poll()
     {
       constexpr double interval = 0.01; // seconds
