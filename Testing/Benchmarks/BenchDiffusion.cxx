@@ -5,22 +5,24 @@
  * in turn, so that their quotients mean something on a busy machine.
  *
  *   bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256,384,512] [--media 1,2,3]
- *     [--threads 1,2] [--repeat 5] [--tolerance 1e-6] [--sections floor,step,error,solve]
- *     [--error-size 128] [--limit 1500] [--quick]
+ *     [--threads 1,2] [--repeat 5] [--tolerance 1e-6]
+ *     [--sections floor,step,region,error,solve] [--error-size 128] [--limit 2400] [--quick]
  *
  * Prints tables of Markdown and leaves the same numbers as CSV in FOLDER:
  *   floor  STREAM's triad; what share of it the explicit step and a Jacobi sweep reach;
  *          touch: what memory fresh from the system costs
  *   step   one explicit step, beside table 4.1 of the source thesis
+ *   region what part of the volume is solved for where light stays in a tube, and would be on the
+ *          tiles of an OpenVDB tree
  *   error  the true error against time, for the tolerances of this solver and of hypre
  *          (bench-frugal --sections knobs has the filter's other knobs)
  *   solve  the steady solve at growing sizes: this solver, hypre, Eigen, OpenVDB, Jacobi;
  *          media 1 and 2 are issue 3's two columns, 3 is the same everywhere (up to 384^3).
  *          runs: each single run, as it comes; summary: against hypre
- * The solvers take turns within a repeat. Beyond 256^3 at most 3 repeats, on the most threads
- * alone; all but this solver and PFMG have as many repeats as fit into half a minute. What would
- * not fit into that, the memory, or --limit seconds from the start on (0: no limit) is not run,
- * and the row says what it would take. --quick is a smoke test: tiny sizes, once. Times are
+ * The solvers take turns within a repeat. Beyond 256^3 on the most threads alone, beyond 384^3 at
+ * most 3 repeats; all but this solver and PFMG have as many repeats as fit into half a minute. What
+ * would not fit into that, the memory, or --limit seconds from the start on (0: no limit) is not
+ * run, and the row says what it would take. --quick is a smoke test: tiny sizes, once. Times are
  * medians of the repeats, quotients are medians of each repeat's own. Exits with 1 if this solver
  * misses the tolerance anywhere, whatever the times are. bench-diffusion.sh builds, runs, draws.
  */
@@ -64,13 +66,13 @@ struct Options
   std::vector<int> threads{ 1, 2 };
   std::vector<int> stepSizes{ 128, 256, 512 };
   std::vector<int> floorSizes{ 128, 256 };
-  std::vector<std::string> sections{ "floor", "step", "error", "solve" };
+  std::vector<std::string> sections{ "floor", "step", "region", "error", "solve" };
   int repeat = 5;
   int errorSize = 128;
   double tolerance = 1e-6;
   std::int64_t triadLength = 32 << 20;
   std::size_t touched = std::size_t(800) << 20; ///< bytes, what a solve at 256^3 takes
-  double limit = 1500.;                         ///< seconds
+  double limit = 2400.;                         ///< seconds
   bool quick = false;
   std::string folderOfProgram;
   double began = 0.;
@@ -418,7 +420,10 @@ Run SolveJacobi(const Problem& problem, int threads, std::vector<double>& phi)
 }
 
 //------------------------------------------------------------------------------
-/** ms of one explicit step: that of many less that of one, so that a call's other passes cancel. */
+/**
+ * Seconds of one explicit step: those of many less those of two, so that a call's other passes
+ * cancel. Only in a heap that keeps its memory, or fresh memory counts in one and not the other.
+ */
 double StepSeconds(
   DiffusionSolver& solver, const Problem& problem, std::vector<double>& phi, int more)
 {
@@ -455,6 +460,7 @@ double MeasureFloor(const Options& options)
     "|---|---|---|---|---|---|---|\n",
     8e-6 * static_cast<double>(options.triadLength));
   double result = 0.;
+  const KeepHeap keep;
   for (const int threads : options.threads)
   {
     const ParallelFor parallelFor = OnThreads(threads);
@@ -476,6 +482,7 @@ double MeasureFloor(const Options& options)
       jacobi.sweep(parallelFor);
       std::vector<double> phi(problem.q.size(), 0.);
       const int more = n >= 200 ? 4 : 20;
+      StepSeconds(solver, problem, phi, more); // touches the memory
       for (int i = 0; i < options.repeat; ++i)
       {
         for (int j = 0; j < 3; ++j)
@@ -568,6 +575,7 @@ void MeasureSteps(const Options& options)
               "| size | ms per step | ns per voxel | thesis, ms |\n|---|---|---|---|\n",
     threads);
   double perVoxel = 0.;
+  const KeepHeap keep;
   for (const int n : options.stepSizes)
   {
     const double voxels = std::pow(n, 3.);
@@ -608,6 +616,105 @@ void MeasureSteps(const Options& options)
   const double s = perVoxel * std::pow(1024., 3.);
   std::printf("| 1024³ (extrapolated) | %.0f | %.2f | 709.4 |\n", 1e3 * s, 1e9 * perVoxel);
   csv.add(1024, threads, s, 709.4);
+  std::fflush(stdout);
+}
+
+//------------------------------------------------------------------------------
+/** Light in a bent tube of clear matter, in dark matter: n^3 voxels. */
+Problem MakeTube(int n)
+{
+  Problem problem;
+  problem.name = "tube";
+  problem.grid.dims = { { n, n, n } };
+  const std::size_t count = static_cast<std::size_t>(problem.grid.size());
+  problem.D.assign(count, 1e-4f);
+  problem.sigma_a.assign(count, 1.f);
+  problem.q.assign(count, 0.f);
+  const auto axis = [](double x, double& y, double& z)
+  {
+    y = .5 + .2 * std::sin(6. * x);
+    z = .5 + .2 * std::cos(6. * x);
+  };
+  const double radius = 4. / n;
+  std::size_t at = 0;
+  for (int k = 0; k < n; ++k)
+  {
+    for (int j = 0; j < n; ++j)
+    {
+      for (int i = 0; i < n; ++i, ++at)
+      {
+        double y, z;
+        axis(1. * i / n, y, z);
+        if (std::hypot(1. * j / n - y, 1. * k / n - z) < radius)
+        {
+          problem.D[at] = 1.f;
+          problem.sigma_a[at] = 1e-3f;
+        }
+      }
+    }
+  }
+  double y, z;
+  axis(.4, y, z);
+  problem.seed =
+    problem.grid.index(static_cast<int>(.4 * n), static_cast<int>(y * n), static_cast<int>(z * n));
+  problem.q[static_cast<std::size_t>(problem.seed)] = 1.f;
+  return problem;
+}
+
+void MeasureRegion(const Options& options)
+{
+  const int n = options.quick ? 32 : 128;
+  const int threads = options.most();
+  const ParallelFor parallelFor = OnThreads(threads);
+  const Problem problem = MakeTube(n);
+  const std::size_t count = problem.q.size();
+  std::vector<double> phi(count, 0.);
+  DiffusionControl control;
+  control.tolerance = options.tolerance;
+  std::vector<double> seconds;
+  double part = 0.;
+  for (int i = 0; i < options.repeat; ++i)
+  {
+    const double began = now();
+    DiffusionSolver solver(parallelFor);
+    const DiffusionReport report =
+      solver.solveActive(problem.medium(), problem.q.data(), phi.data(), control);
+    seconds.push_back(now() - began);
+    part = report.activeFraction;
+  }
+  const double most = *std::max_element(phi.begin(), phi.end());
+  std::vector<std::uint8_t> lit(count);
+  std::transform(phi.begin(), phi.end(), lit.begin(),
+    [most](double value) { return static_cast<std::uint8_t>(value > 1e-7 * most); });
+  const double voxels = static_cast<double>(count);
+  const double litPart = static_cast<double>(std::count(lit.begin(), lit.end(), 1)) / voxels;
+
+  Table csv(options, "region", "what,size,threads,percent_of_volume,seconds");
+  std::printf("\n## Where light stays in a tube, %d³\n\n"
+              "Per cent of the volume's voxels: those with more than 1e-7 of the largest phi; the "
+              "rows of the active region, and the time to find it and solve on it, medium to phi; "
+              "the tiles of 8³ of an OpenVDB tree that has those same voxels, and the time to grow "
+              "its topology from the source into them, a voxel at a time, with no solve.\n\n"
+              "| what | %% of the volume | s |\n|---|---|---|\n",
+    n);
+  const auto line = [&](const char* what, double share, double s)
+  {
+    std::printf("| %s | %.2f | %s |\n", what, 100. * share, number(s, "%.4f").c_str());
+    csv.add(Quoted(what), n, threads, 100. * share, s);
+  };
+  line("lit voxels", litPart, -1.);
+  line("active region: rows, and all of the solve", part, median(seconds));
+#ifdef BENCH_WITH_OPENVDB
+  std::vector<double> growing;
+  double tiles = 0.;
+  for (int i = 0; i < options.repeat; ++i)
+  {
+    double s = 0.;
+    tiles = GrowOpenVDB(problem, lit, s) / voxels;
+    growing.push_back(s);
+  }
+  line("OpenVDB: tiles, and growing alone", tiles, median(growing));
+#endif
   std::fflush(stdout);
 }
 
@@ -1007,7 +1114,7 @@ bool MeasureSolves(const Options& options, double triad)
         const double seconds = expected(entry);
         // and the answer twice, where another process gives it
         const double bytes = costOf(entry).size ? (costOf(entry).bytes + 16.) * voxels : 0.;
-        const int wanted = n <= 256 ? options.repeat : std::min(3, options.repeat);
+        const int wanted = n <= 384 ? options.repeat : std::min(3, options.repeat);
         entry.repeat =
           main ? wanted : std::min(wanted, static_cast<int>(Patience / std::max(1e-3, seconds)));
         char text[100] = "";
@@ -1256,7 +1363,7 @@ int main(int argc, char* argv[])
     std::fprintf(stderr,
       "usage: bench-diffusion [--output FOLDER] [--sizes 32,64,96,128,256,384,512]\n"
       "  [--media 1,2,3] [--threads 1,2] [--repeat 5] [--tolerance 1e-6]\n"
-      "  [--sections floor,step,error,solve] [--error-size 128] [--limit 1500] [--quick]\n"
+      "  [--sections floor,step,region,error,solve] [--error-size 128] [--limit 2400] [--quick]\n"
       "  (sizes are 16 at least; --limit in seconds, 0: none)\n");
     return 2;
   }
@@ -1305,6 +1412,10 @@ int main(int argc, char* argv[])
   {
     say(options, "step");
     MeasureSteps(options);
+  }
+  if (options.has("region"))
+  {
+    MeasureRegion(options);
   }
   if (options.has("error"))
   {

@@ -41,6 +41,12 @@ Run SolveEigen(const Problem& problem, double tolerance, std::vector<double>& ph
  * Copying in and out counts as assemble.
  */
 Run SolveOpenVDB(const Problem& problem, double tolerance, int threads, std::vector<double>& phi);
+
+/**
+ * Grows a MaskTree from the problem's seed into what is lit, a voxel at a time, until nothing is
+ * new. Returns how many voxels its leaves have in all; `seconds` is the growing's time.
+ */
+double GrowOpenVDB(const Problem& problem, const std::vector<std::uint8_t>& lit, double& seconds);
 } // namespace benchmark
 } // namespace lighttransport
 

@@ -4,6 +4,7 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
+#include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/PoissonSolver.h>
 #include <tbb/global_control.h>
 
@@ -62,6 +63,35 @@ Run SolveOpenVDB(const Problem& problem, double tolerance, int threads, std::vec
   openvdb::tools::copyToDense(*answer, dense);
   run.assemble += now() - began;
   return run;
+}
+
+double GrowOpenVDB(const Problem& problem, const std::vector<std::uint8_t>& lit, double& seconds)
+{
+  const std::array<int, 3>& n = problem.grid.dims;
+  const auto coordinate = [&n](std::int64_t i)
+  {
+    return openvdb::Coord(static_cast<int>(i % n[0]), static_cast<int>(i / n[0] % n[1]),
+      static_cast<int>(i / (static_cast<std::int64_t>(n[0]) * n[1])));
+  };
+  openvdb::MaskTree open(false);
+  for (std::size_t i = 0; i < lit.size(); ++i)
+  {
+    if (lit[i])
+    {
+      open.setValueOn(coordinate(static_cast<std::int64_t>(i)));
+    }
+  }
+  const double began = now();
+  openvdb::MaskTree grown(false);
+  grown.setValueOn(coordinate(problem.seed));
+  for (openvdb::Index64 before = 0; grown.activeVoxelCount() > before;)
+  {
+    before = grown.activeVoxelCount();
+    openvdb::tools::dilateActiveValues(grown, 1, openvdb::tools::NN_FACE);
+    grown.topologyIntersection(open);
+  }
+  seconds = now() - began;
+  return static_cast<double>(grown.leafCount()) * openvdb::MaskTree::LeafNodeType::SIZE;
 }
 } // namespace benchmark
 } // namespace lighttransport

@@ -7,7 +7,7 @@
 # Installs what only the benchmark needs (hypre with MPI, Eigen, matplotlib), builds
 # in build/bench, runs bench-diffusion with the options given (see BenchDiffusion.cxx),
 # and leaves bench-diffusion.md, *.csv and *.png in build/bench/results, or where
-# --output says; what is there when it is interrupted is drawn. 25 minutes and 16 GB of
+# --output says; what is there when it is interrupted is drawn. 40 minutes and 16 GB of
 # memory on an idle machine (--limit SECONDS: less); --quick: half a minute.
 # --all: then also the error against time of the filter's other knobs (grid, region,
 # precision, target; bench-frugal.sh --sections knobs), two minutes more.
