@@ -1012,6 +1012,24 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     control.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
     return kept.solver.solveSteady(q, phi.data(), control);
   };
+  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
+    (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
+      this->TargetError < 1e-6);
+  const vtkSmartPointer<vtkDataArray> fluence =
+    vtk::TakeSmartPointer(vtkDataArray::CreateDataArray(toDouble ? VTK_DOUBLE : VTK_FLOAT));
+  if (moment || coarse)
+  {
+    // Little is freed before it is filled: who cancels does not wait for fresh memory.
+    const auto touch = [&](auto* array)
+    {
+      array->SetNumberOfTuples(size);
+      lighttransport::PreferLargePages(array->GetPointer(0),
+        static_cast<std::size_t>(size) * static_cast<std::size_t>(array->GetDataTypeSize()));
+      lighttransport::Touch(array->GetPointer(0), size, parallel);
+    };
+    toDouble ? touch(vtkDoubleArray::FastDownCast(fluence))
+             : touch(vtkFloatArray::FastDownCast(fluence));
+  }
   lighttransport::FirstMomentReport energies;
   const auto solve = [&](const auto* q) -> DiffusionReport
   {
@@ -1121,9 +1139,6 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   this->AbsorbedPower = report.absorbed;
   this->EscapedPower = report.escaped;
   this->LeakedPower = report.leaked;
-  const bool toDouble = this->OutputPrecision == DOUBLE_PRECISION ||
-    (this->OutputPrecision == DEFAULT_PRECISION && this->TargetError > 0. &&
-      this->TargetError < 1e-6);
   // what rounding the output adds: 2^-24 at the most
   const auto rounded = [toDouble](double estimate, double rounding)
   { return estimate < 0. || toDouble ? estimate : std::hypot(estimate, rounding); };
@@ -1174,17 +1189,14 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   }
 
   // 4. the arrays
-  vtkSmartPointer<vtkDataArray> fluence;
   if (toDouble)
   {
-    vtkNew<vtkDoubleArray> array;
-    fill(array.Get(), phi.data(), size, parallel.whole());
-    fluence = array;
+    fill(vtkDoubleArray::FastDownCast(fluence), phi.data(), size, parallel.whole());
   }
   else
   {
-    vtkNew<vtkFloatArray> array;
-    const double extreme = fill(array.Get(), phi.data(), size, parallel.whole());
+    const double extreme =
+      fill(vtkFloatArray::FastDownCast(fluence), phi.data(), size, parallel.whole());
     if (extreme > static_cast<double>(std::numeric_limits<float>::max()))
     {
       text << "the fluence reaches " << extreme
@@ -1194,7 +1206,6 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       this->StopReason = NotFinite; // as a float
       return false;
     }
-    fluence = array;
   }
   output->ShallowCopy(input);
   fluence->SetName(names::Fluence);

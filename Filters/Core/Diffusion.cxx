@@ -46,8 +46,9 @@ constexpr double MostLeaked = 1e-2;
 
 /** Explicit steps on so many values go through the memory together, where nobody need be asked. */
 constexpr std::int64_t SeveralStepsFrom = std::int64_t(1) << 19;
-constexpr std::int64_t AskedInTimeUpTo = std::int64_t(1) << 24;
 constexpr int StepsInOnePass = 4;
+/** Where somebody need be: voxels times steps in a pass, some 30 ms. */
+constexpr std::int64_t AskedAfter = std::int64_t(1) << 25;
 
 /** By which seven floats, summed in float, may be more. */
 constexpr double SumInFloat = 1. + 5e-7;
@@ -3410,14 +3411,16 @@ DiffusionReport DiffusionSolver::march(const T* q, SteppedField field, int steps
       Showing show(control);
       // What does not fit the cache goes several steps in one pass over the memory. Nobody is asked
       // between these; where somebody is there to be asked they must not last.
-      const bool several =
-        size >= SeveralStepsFrom && (!control.progress || size <= AskedInTimeUpTo);
+      const int inOnePass = size < SeveralStepsFrom ? 1
+        : !control.progress
+        ? StepsInOnePass
+        : static_cast<int>(std::clamp<std::int64_t>(AskedAfter / size, 1, StepsInOnePass));
       const std::size_t rowCount = static_cast<std::size_t>(this->rows());
       std::vector<double> squares(StepsInOnePass * rowCount);
       report.reason = StopReason::MaxIterations;
       while (report.iterations < steps)
       {
-        const int stages = several ? std::min(StepsInOnePass, steps - report.iterations) : 1;
+        const int stages = std::min(inOnePass, steps - report.iterations);
         const auto advance = [&](int stage, std::int64_t r)
         {
           const double* from = fields[(at + stage) % 2];

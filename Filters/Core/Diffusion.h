@@ -242,7 +242,8 @@ public:
    * Where D and sigma_a are constant and nothing is outside, all implicit steps are made at once by
    * ConstantMedium, in the time of one steady solve, to double's rounding.
    * On half a million voxels or more, explicit steps go through the memory four at a time, with
-   * the same result; convergence and progress are then asked for after each four.
+   * the same result; convergence and progress are then asked for after each four (each two from 8
+   * million voxels on, and amid each from 17 million on, where there is a progress to ask).
    */
   template <class T>
   DiffusionReport stepExplicit(

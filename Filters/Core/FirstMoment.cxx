@@ -5,6 +5,7 @@
 #include "Core/Kernel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <sstream>
 
@@ -33,6 +34,60 @@ void diverge(int n, double perH, const double* LIGHTTRANSPORT_RESTRICT high,
   {
     out[i] += perH * (high[i] - low[i]);
   }
+}
+
+/**
+ * The step of phi in one row, from q - div E = q - out; adds the sums of the squares of its rate,
+ * of what is absorbed and of what is stored.
+ */
+template <bool Lit, class T>
+LIGHTTRANSPORT_INLINE void advanceOf(int n, double cdt, const float* LIGHTTRANSPORT_RESTRICT sigma,
+  const float* LIGHTTRANSPORT_RESTRICT weight, const T* LIGHTTRANSPORT_RESTRICT q,
+  const double* LIGHTTRANSPORT_RESTRICT out, double* LIGHTTRANSPORT_RESTRICT phi, double* sums)
+{
+  constexpr int strands = 8;
+  double all[3][strands] = {};
+  const auto one = [&](int i, int l)
+  {
+    const double gain = (Lit ? static_cast<double>(q[i]) : 0.) - out[i];
+    const double change = gain - static_cast<double>(sigma[i]) * phi[i];
+    const double mean = static_cast<double>(weight[i]) * change; // over the step
+    phi[i] += cdt * mean;
+    all[0][l] += change * change;
+    all[1][l] += gain - mean; // not from the loss, of which a long step leaves nothing
+    all[2][l] += mean;
+  };
+  int i = 0;
+  for (; i + strands <= n; i += strands)
+  {
+    for (int l = 0; l < strands; ++l)
+    {
+      one(i + l, l);
+    }
+  }
+  for (; i < n; ++i)
+  {
+    one(i, 0);
+  }
+  for (int k = 0; k < 3; ++k)
+  {
+    const double* s = all[k];
+    sums[k] += ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
+  }
+}
+LIGHTTRANSPORT_SIMD
+void advanceRow(int n, double cdt, const float* sigma, const float* weight, const float* q,
+  const double* out, double* phi, double* sums)
+{
+  q ? advanceOf<true>(n, cdt, sigma, weight, q, out, phi, sums)
+    : advanceOf<false>(n, cdt, sigma, weight, q, out, phi, sums);
+}
+LIGHTTRANSPORT_SIMD
+void advanceRow(int n, double cdt, const float* sigma, const float* weight, const double* q,
+  const double* out, double* phi, double* sums)
+{
+  q ? advanceOf<true>(n, cdt, sigma, weight, q, out, phi, sums)
+    : advanceOf<false>(n, cdt, sigma, weight, q, out, phi, sums);
 }
 
 /** The rate at which a face goes to Fick's flux: 1 / (3 D_f), the border's half voxel twice. */
@@ -163,6 +218,7 @@ void FirstMomentSolver::prepare(const DiffusionMedium<T>& medium)
     f.lowE.allocate(low);
   }
   this->lag = this->relaxedOver = this->cdt = this->stability = 0.;
+  this->stepped = 0;
 
   const bool closed = medium.boundary == Boundary::ZeroFlux;
   const double twoA =
@@ -220,13 +276,14 @@ void FirstMomentSolver::reset()
 {
   for (Faces& f : this->faces)
   {
-    if (this->lag != 0.) // else no step has touched them
+    if (this->lag != 0. || this->stepped > 0) // else no step has touched them
     {
       f.E.allocate(f.E.size());
       f.lowE.allocate(f.lowE.size());
     }
   }
   this->lag = 0.;
+  this->stepped = 0;
 }
 
 //------------------------------------------------------------------------------
@@ -395,44 +452,66 @@ void FirstMomentSolver::weighAbsorption(double length)
 //------------------------------------------------------------------------------
 void FirstMomentSolver::stepE(const double* phi)
 {
+  this->relaxOver(this->steppingOver);
   const int nx = this->box.dims[0];
   const double* beyond = this->zeros.data();
-  ForRows(this->parallelFor.whole(), this->rows(), this->box.size(),
-    [&](std::int64_t begin, std::int64_t end)
+  const std::int64_t from = this->stepped;
+  std::atomic<std::int64_t> done{ from };
+  const auto rest = [&](std::int64_t begin, std::int64_t end)
+  {
+    for (std::int64_t r = from + begin; r < from + end; ++r)
     {
-      for (std::int64_t r = begin; r < end; ++r)
+      for (int d = 0; d < 3; ++d)
       {
-        for (int d = 0; d < 3; ++d)
+        const Row row(this->box, d, r);
+        if (row.none)
         {
-          const Row row(this->box, d, r);
-          if (row.none)
-          {
-            continue;
-          }
-          Faces& f = this->faces[static_cast<std::size_t>(d)];
-          const std::int64_t o = row.begin;
-          const float* G = f.conductance.data() + o;
-          const float* R = f.relaxation.data() + o;
-          double* E = f.E.data() + o;
-          int low = row.first ? nx : 0;
-          if (d == 0)
-          {
-            relax(nx - 1, G, R, phi + o, phi + o + 1, E);
-            relax(1, G + nx - 1, R + nx - 1, phi + o + nx - 1, beyond, E + nx - 1);
-            low = 1;
-          }
-          else
-          {
-            relax(nx, G, R, phi + o, row.last ? beyond : phi + o + row.next, E);
-          }
-          if (low > 0)
-          {
-            relax(low, f.lowConductance.data() + row.low, f.lowRelaxation.data() + row.low, beyond,
-              phi + o, f.lowE.data() + row.low);
-          }
+          continue;
+        }
+        Faces& f = this->faces[static_cast<std::size_t>(d)];
+        const std::int64_t o = row.begin;
+        const float* G = f.conductance.data() + o;
+        const float* R = f.relaxation.data() + o;
+        double* E = f.E.data() + o;
+        int low = row.first ? nx : 0;
+        if (d == 0)
+        {
+          relax(nx - 1, G, R, phi + o, phi + o + 1, E);
+          relax(1, G + nx - 1, R + nx - 1, phi + o + nx - 1, beyond, E + nx - 1);
+          low = 1;
+        }
+        else
+        {
+          relax(nx, G, R, phi + o, row.last ? beyond : phi + o + row.next, E);
+        }
+        if (low > 0)
+        {
+          relax(low, f.lowConductance.data() + row.low, f.lowRelaxation.data() + row.low, beyond,
+            phi + o, f.lowE.data() + row.low);
         }
       }
-    });
+    }
+    std::int64_t before = done;
+    while (before < from + end && !done.compare_exchange_weak(before, from + end))
+    {
+    }
+  };
+  try
+  {
+    ForRows(this->parallelFor, this->rows() - from, (this->rows() - from) * nx, rest);
+  }
+  catch (const Interrupted&)
+  {
+    this->stepped = done; // pieces come in order
+    throw;
+  }
+  this->stepped = 0;
+  this->lag -= this->steppingOver;
+}
+
+double FirstMomentSolver::lagOf(std::int64_t row) const
+{
+  return row < this->stepped ? this->lag - this->steppingOver : this->lag;
 }
 
 //------------------------------------------------------------------------------
@@ -476,18 +555,13 @@ FirstMomentSolver::Sums FirstMomentSolver::stepPhi(const T* q, double* phi)
             }
           }
         }
-        for (int x = 0; x < nx; ++x)
-        {
-          const std::int64_t i = r * nx + x;
-          const double loss = static_cast<double>(this->sigma_a[i]) * phi[i];
-          const double gain = (q ? static_cast<double>(q[i]) : 0.) - out[x];
-          const double change = gain - loss;
-          const double mean = static_cast<double>(this->weight[i]) * change; // over the step
-          phi[i] += this->cdt * mean;
-          sums.rate2 += change * change;
-          sums.absorbed += gain - mean; // not from the loss, of which a long step leaves nothing
-          sums.stored += mean;
-        }
+        const std::int64_t o = r * nx;
+        double three[3] = { 0., 0., 0. };
+        advanceRow(nx, this->cdt, this->sigma_a.data() + o, this->weight.data() + o,
+          q ? q + o : nullptr, out, phi + o, three);
+        sums.rate2 = three[0];
+        sums.absorbed = three[1];
+        sums.stored = three[2];
       }
     });
   Sums all;
@@ -612,12 +686,15 @@ void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
   report.bytes = this->bytes() + size * static_cast<std::int64_t>(sizeof(double));
   report.reason = StopReason::MaxIterations;
   Showing show(control);
+  if (this->stepped > 0)
+  {
+    this->stepE(phi); // what a call before was cancelled in
+  }
   for (int i = 0; i < steps; ++i)
   {
     // E goes from where it is to half a step after phi, phi from there half a step further.
-    this->relaxOver(this->lag + 0.5 * length);
+    this->steppingOver = this->lag + 0.5 * length;
     this->stepE(phi);
-    this->lag = -0.5 * length;
     this->parallelFor.poll();
     const Sums sums = this->stepPhi(q, phi);
     this->lag = 0.5 * length;
@@ -687,20 +764,21 @@ bool FirstMomentSolver::flux(const double* phi, T* E, const ProgressFunction& pr
           }
           const Faces& f = this->faces[static_cast<std::size_t>(d)];
           // from E's time to phi's
-          const auto advanced = [&](double e, float conductance, double difference, bool border)
+          const auto advanced =
+            [&](double e, float conductance, double difference, bool border, double behind)
           {
             const double G = static_cast<double>(conductance);
-            return e +
-              relaxationOf(G, row.h, border, std::max(0., this->lag)) * (G * difference - e);
+            return e + relaxationOf(G, row.h, border, std::max(0., behind)) * (G * difference - e);
           };
+          const double own = this->lagOf(r);
           const bool first = d == 0 ? x == 0 : row.first;
           const bool last = d == 0 ? x + 1 == nx : row.last;
           const double high =
-            advanced(f.E[i], f.conductance[i], phi[i] - (last ? 0. : phi[i + row.next]), last);
+            advanced(f.E[i], f.conductance[i], phi[i] - (last ? 0. : phi[i + row.next]), last, own);
           const double low = first
-            ? advanced(f.lowE[row.low + x], f.lowConductance[row.low + x], -phi[i], true)
-            : advanced(
-                f.E[i - row.next], f.conductance[i - row.next], phi[i - row.next] - phi[i], false);
+            ? advanced(f.lowE[row.low + x], f.lowConductance[row.low + x], -phi[i], true, own)
+            : advanced(f.E[i - row.next], f.conductance[i - row.next], phi[i - row.next] - phi[i],
+                false, this->lagOf((i - row.next) / nx));
           E[3 * i + d] = static_cast<T>(0.5 * (low + high));
         }
       }

@@ -78,7 +78,8 @@ public:
    * earlier call left, or 0. q may be null: none. Each call may have its own c dt. MaxIterations
    * says that all steps were made, Converged that the steady state came first: both the residual
    * of diffusion, |q - A phi| / |q|, and the same with E in place of Fick's flux are at or below
-   * the tolerance.
+   * the tolerance. After Cancelled, phi is that of the last whole step, and a call with it goes on
+   * from there as if nothing had been.
    */
   template <class T>
   FirstMomentReport step(
@@ -129,7 +130,13 @@ private:
   /** Fills the relaxations for a step of E over `length`. */
   void relaxOver(double length);
   void weighAbsorption(double cdt);
+  /**
+   * E goes over steppingOver. Interrupted, it is there in the rows before `stepped`, and the next
+   * call goes on from these.
+   */
   void stepE(const double* phi);
+  /** c t by which E of a row is behind phi; negative: cancelled between them. */
+  double lagOf(std::int64_t row) const;
   template <class T>
   Sums stepPhi(const T* q, double* phi);
   /** |q - A phi| with Fick's flux; q may be null. */
@@ -141,10 +148,12 @@ private:
   std::array<Faces, 3> faces;
   Buffer<float> sigma_a, weight; // (1 - exp(-sigma_a c dt)) / (sigma_a c dt)
   std::vector<double> zeros;     // a row of phi beyond the border
-  double lag = 0.;               // c t by which E is behind phi; negative: cancelled between them
-  double relaxedOver = 0.;       // what the relaxations are made for
-  double cdt = 0.;               // what the weights are made for
-  double stability = 0.;         // 0: not known yet
+  double lag = 0.;               // of the rows from `stepped` on, see lagOf
+  double steppingOver = 0.;
+  std::int64_t stepped = 0;
+  double relaxedOver = 0.; // what the relaxations are made for
+  double cdt = 0.;         // what the weights are made for
+  double stability = 0.;   // 0: not known yet
 };
 } // namespace lighttransport
 

@@ -7,8 +7,10 @@
 #include "LightTransportTesting.h"
 #include "ThreadedFor.h"
 
+#include <chrono>
 #include <limits>
 #include <random>
+#include <thread>
 
 using namespace lighttransport;
 using lighttransport::testing::CollocatedMoments;
@@ -654,6 +656,69 @@ void invariances(Suite& suite)
   LT_CHECK(suite, LargestDifference(negative.phi, phi) <= 1e-14 * largest);
 }
 
+/** Cancelled wherever it may be: phi is that of whole steps, and what follows is as if not. */
+void cancelled(Suite& suite)
+{
+  const DiffusionScene scene = randomScene(12, { { 1000, 9, 5 } }, 2.);
+  constexpr int steps = 3;
+  std::vector<std::vector<double>> after{ scene.phi };
+  std::vector<double> E(3 * scene.phi.size());
+  {
+    FirstMomentSolver solver;
+    solver.setMedium(scene.medium());
+    for (int i = 0; i < steps; ++i)
+    {
+      after.push_back(after.back());
+      solver.step(
+        scene.q.data(), after.back().data(), 1, solver.courantBound(), DiffusionControl());
+    }
+    solver.flux(after.back().data(), E.data());
+  }
+  int amid = 0; // the cancellations between whole steps' ends
+  bool ended = false;
+  for (int target = 1; !ended; target += 3)
+  {
+    // whoever is asked is asked after a loop that lasts
+    int calls = 0;
+    bool armed = false;
+    bool stop = false;
+    FirstMomentSolver solver(
+      [&](std::int64_t n, const RangeBody& body)
+      {
+        body(0, n);
+        if (armed && ++calls == target)
+        {
+          std::this_thread::sleep_for(std::chrono::milliseconds(11));
+          stop = true;
+        }
+      });
+    solver.setMedium(scene.medium());
+    armed = true;
+    DiffusionControl control;
+    control.progress = [&](double) { return !stop; };
+    std::vector<double> phi = scene.phi;
+    const double cdt = solver.courantBound();
+    const FirstMomentReport report = solver.step(scene.q.data(), phi.data(), steps, cdt, control);
+    ended = !stop;
+    const int made = report.iterations;
+    LT_CHECK(suite, (report.reason == StopReason::Cancelled) == stop);
+    LT_CHECK(suite, phi == after[static_cast<std::size_t>(made)]);
+    amid += stop && made > 0 && made < steps ? 1 : 0;
+    std::vector<double> F(E.size());
+    solver.flux(phi.data(), F.data());
+    LT_CHECK(suite, std::all_of(F.begin(), F.end(), [](double v) { return std::isfinite(v); }));
+    if (made < steps)
+    {
+      solver.step(scene.q.data(), phi.data(), steps - made, cdt, DiffusionControl());
+    }
+    LT_CHECK(suite, phi == after.back());
+    solver.flux(phi.data(), F.data());
+    LT_CHECK(suite, E == F);
+  }
+  std::cout << "cancelled amid steps " << amid << " times\n";
+  LT_CHECK(suite, amid >= 4);
+}
+
 void conduct(Suite& suite)
 {
   DiffusionScene scene = randomScene(10, { { 9, 8, 7 } }, 2.);
@@ -724,6 +789,7 @@ int main(int argc, char* argv[])
   diffusionLimit(suite);
   reflection(suite);
   invariances(suite);
+  cancelled(suite);
   conduct(suite);
   return suite.result();
 }
