@@ -363,7 +363,7 @@ void vtkLightDiffusionFilter::ClearReport()
   this->StopReason = BadInput;
   this->Message.clear();
   this->NumberOfIterationsUsed = 0;
-  this->Residual = 0.;
+  this->Residual = -1.;
   this->SolveSeconds = 0.;
   this->Bytes = 0;
   this->FineGridApplications = 0.;
@@ -1126,7 +1126,6 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
   {
     report.reason = lighttransport::StopReason::Cancelled;
     report.message = "cancelled between two solves";
-    report.residual = -1.;
   }
   this->StopReason = static_cast<int>(report.reason);
   this->Message = report.message;
@@ -1181,11 +1180,19 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       this->EstimatedError >= 0.);
   if (this->StopReason == Breakdown || (this->StopReason == MaxIterations && !asAsked))
   {
+    std::ostringstream residual;
+    if (this->Residual < 0.)
+    {
+      residual << "not known";
+    }
+    else
+    {
+      residual << this->Residual << " instead of <= " << this->Tolerance;
+    }
     vtkWarningMacro(<< this->GetStopReasonAsString() << " after " << this->NumberOfIterationsUsed
-                    << " iterations: the relative residual is " << this->Residual
-                    << " instead of <= " << this->Tolerance << (report.message.empty() ? "" : " (")
-                    << report.message << (report.message.empty() ? "" : ")")
-                    << "; the best answer is kept");
+                    << " iterations: the relative residual is " << residual.str()
+                    << (report.message.empty() ? "" : " (") << report.message
+                    << (report.message.empty() ? "" : ")") << "; the best answer is kept");
   }
 
   // 4. the arrays

@@ -385,7 +385,8 @@ public:
   vtkGetMacro(NumberOfIterationsUsed, int);
   /**
    * |b - A phi| / |b| of the steady equation, recomputed in double from the answer; after Cancelled
-   * not recomputed, and negative where it is not known.
+   * not recomputed. Negative (-1) where it is not known: before there is an answer, and of a
+   * preview in haste (TimeBudget). So ask for 0 <= residual <= tolerance.
    */
   vtkGetMacro(Residual, double);
   vtkGetMacro(SolveSeconds, double);
@@ -480,7 +481,7 @@ private:
   int StopReason = BadInput;
   std::string Message;
   int NumberOfIterationsUsed = 0;
-  double Residual = 0.;
+  double Residual = -1.;
   double SolveSeconds = 0.;
   vtkIdType Bytes = 0;
   double FineGridApplications = 0.;

@@ -681,16 +681,17 @@ int Run(Options options)
   const bool steady = options.Mode == "steady";
   const bool converged = reason == vtkLightDiffusionFilter::Converged ||
     (!steady && reason == vtkLightDiffusionFilter::MaxIterations);
+  const std::string residual =
+    diffusion->GetResidual() < 0. ? "not known" : FormatNumber(diffusion->GetResidual());
   progress.Say("solve: " + Fixed(seconds, 2) + " s, " + diffusion->GetStopReasonAsString() + ", " +
-    std::to_string(diffusion->GetNumberOfIterationsUsed()) + " iterations, residual " +
-    FormatNumber(diffusion->GetResidual()) + "; power emitted " +
-    FormatNumber(diffusion->GetEmittedPower()) + ", absorbed " +
+    std::to_string(diffusion->GetNumberOfIterationsUsed()) + " iterations, residual " + residual +
+    "; power emitted " + FormatNumber(diffusion->GetEmittedPower()) + ", absorbed " +
     FormatNumber(diffusion->GetAbsorbedPower()) + ", escaped " +
     FormatNumber(diffusion->GetEscapedPower()));
   if (!converged)
   {
     std::cerr << "light-volume: warning: the solver stopped with "
-              << diffusion->GetStopReasonAsString() << ", residual " << diffusion->GetResidual()
+              << diffusion->GetStopReasonAsString() << ", residual " << residual
               << ", expected at most " << options.Tolerance << " " << diffusion->GetMessage()
               << "\n";
   }

@@ -1381,12 +1381,15 @@ void CoarseDiffusion::correct(
         }
       });
   }
-  report.residual = power > 0. ? report.residual / std::sqrt(power) : 0.;
+  if (report.residual >= 0.)
+  {
+    report.residual = power > 0. ? report.residual / std::sqrt(power) : 0.;
+  }
   if (whole && report.reason != StopReason::Cancelled)
   {
     // Three corrections are no promise: only an error that is named and met is.
-    const bool reached =
-      named ? report.estimatedError <= enough : report.residual <= control.tolerance;
+    const bool reached = named ? report.estimatedError >= 0. && report.estimatedError <= enough
+                               : report.residual >= 0. && report.residual <= control.tolerance;
     report.reason =
       reached && report.message.empty() ? StopReason::Converged : StopReason::MaxIterations;
     if (!reached && report.message.empty())

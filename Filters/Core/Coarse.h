@@ -51,9 +51,9 @@ public:
    * phi: in, with fromPhi, the start; out, the answer reached. Without a named error or a time
    * budget, three corrections are made. The report's estimated errors are against the full grid's
    * answer, its powers the full grid's; its residual is that of the full grid's equations before
-   * the last correction. MaxIterations where the corrections do not reach control.targetError, or,
-   * without one, control.tolerance: phi is then the best so far. phi keeps the sign of sources that
-   * have but one.
+   * the last correction, negative (not known) where haste left no time for one. MaxIterations where
+   * the corrections do not reach control.targetError, or, without one, control.tolerance: phi is
+   * then the best so far. phi keeps the sign of sources that have but one.
    */
   template <class Q>
   DiffusionReport solve(

@@ -2483,7 +2483,6 @@ DiffusionReport DiffusionSolver::solveSteady(
   return this->interruptible(control.progress,
     [&](DiffusionReport& report)
     {
-      report.residual = -1.;
       this->steady(q, phi, control, report);
     });
 }
@@ -2715,7 +2714,6 @@ DiffusionReport DiffusionSolver::solveActive(const DiffusionMedium<T>& medium, c
   return this->interruptible(control.progress,
     [&](DiffusionReport& report)
     {
-      report.residual = -1.;
       this->parallelFor.tell(0.);
       report = this->active(medium, q, phi, control, threshold);
     });
@@ -3008,7 +3006,6 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
   {
     return;
   }
-  report.residual = -1.;
   if (this->isConstant && steps > 0)
   {
     const RightHandSide<T> exact{ q, 1. / this->scale, false };
@@ -3393,7 +3390,6 @@ DiffusionReport DiffusionSolver::march(const T* q, SteppedField field, int steps
       {
         return;
       }
-      report.residual = -1.;
       this->parallelFor.tell(0.);
       const std::int64_t size = this->box.size();
       const int nx = this->box.dims[0];

@@ -96,9 +96,9 @@ struct DiffusionReport
   /**
    * |b - A phi| / |b|, recomputed in double from phi and the medium; in time: of the steady
    * equation, with the float faces where the steps use these. After Cancelled that of the last
-   * iteration or step, not recomputed; negative where there was none.
+   * iteration or step, not recomputed. Negative: not known, nothing has computed it.
    */
-  double residual = 0.;
+  double residual = -1.;
   double seconds = 0.;    ///< this call, the set-up that it needed included
   std::int64_t bytes = 0; ///< held while solving, beyond the caller's arrays
   /** Applications of the operator on the finest grid, or sweeps that cost as much. */

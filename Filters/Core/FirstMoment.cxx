@@ -650,7 +650,6 @@ void FirstMomentSolver::march(const T* q, double* phi, int steps, double length,
     report.message = text.str();
     return;
   }
-  report.residual = -1.;
   const int nx = this->box.dims[0];
   const std::int64_t size = this->box.size();
   const double V = this->box.voxelVolume();

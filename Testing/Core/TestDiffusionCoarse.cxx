@@ -179,6 +179,16 @@ void named(Suite& suite)
     const DiffusionReport hasty = coarse.solve(scene.q.data(), scene.phi.data(), control);
     LT_CHECK(suite, hasty.reason == StopReason::MaxIterations && hasty.estimatedError > 0.);
     LT_CHECK(suite, hasty.message.find("budget") != std::string::npos);
+    // without a correction nobody knows the residual, with or without a budget
+    for (const double budget : { 1e-9, 0. })
+    {
+      control.timeBudget = budget;
+      CoarseDiffusion preview;
+      preview.setMedium(scene.medium(), 4, true);
+      const DiffusionReport guess = preview.solve(scene.q.data(), scene.phi.data(), control);
+      LT_CHECK(suite, guess.reason == StopReason::MaxIterations && guess.residual < 0.);
+      LT_CHECK(suite, guess.message.find("guess") != std::string::npos);
+    }
   }
 }
 

@@ -590,6 +590,12 @@ void coarser(Suite& suite)
   LT_CHECK(suite, hasty->GetStopReason() == Filter::MaxIterations);
   LT_CHECK(suite, hasty->GetUsedCoarseningFactor() == 4);
   LT_CHECK_NEAR(suite, hasty->GetEstimatedError(), 1., 1e-9);
+  LT_CHECK(suite, hasty->GetResidual() < 0.); // nobody has computed it
+  LT_CHECK(suite,
+    hasty->GetOutput()
+        ->GetFieldData()
+        ->GetArray("LightDiffusionReport.Residual")
+        ->GetComponent(0, 0) == hasty->GetResidual());
   LT_CHECK(suite, std::string(hasty->GetMessage()).find("guess") != std::string::npos);
   LT_CHECK_CLOSE(suite, fluenceAt(hasty, 16, 15, 18), fluenceAt(full, 16, 15, 18), 0.5);
   LT_CHECK(suite, fluenceAt(hasty, 30, 15, 16) < 1e-12);
