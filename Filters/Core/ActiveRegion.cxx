@@ -45,9 +45,18 @@ template <class Value>
 double Arrival(const Value from[3], const Value along[3])
 {
   int order[3] = { 0, 1, 2 };
-  std::sort(order, order + 3, [from](int a, int b) { return from[a] < from[b]; });
+  const auto later = [&](int a, int b)
+  {
+    if (from[order[b]] < from[order[a]])
+    {
+      std::swap(order[a], order[b]);
+    }
+  };
+  later(0, 1);
+  later(1, 2);
+  later(0, 1);
   const double first = static_cast<double>(from[order[0]]);
-  double result = std::numeric_limits<double>::infinity();
+  double result = first + static_cast<double>(along[order[0]]);
   double w = 0.;
   double wf = 0.;
   double wff = 0.;
@@ -59,6 +68,10 @@ double Arrival(const Value from[3], const Value along[3])
     w += wd;
     wf += wd * f;
     wff += wd * f * f;
+    if (d == 0)
+    {
+      continue; // along one axis: the result as it stands
+    }
     const double root = wf * wf - w * (wff - 1.);
     if (!(root >= 0.))
     {
@@ -94,7 +107,7 @@ ActiveRegion<T>::ActiveRegion(const DiffusionMedium<T>& what, double threshold)
 }
 
 template <class T>
-double ActiveRegion<T>::step(std::int64_t i, std::int64_t j, int d) const
+double ActiveRegion<T>::damping(std::int64_t i, std::int64_t j, int d) const
 {
   if (!this->open(i) || !this->open(j))
   {
@@ -104,16 +117,20 @@ double ActiveRegion<T>::step(std::int64_t i, std::int64_t j, int d) const
   const double b = static_cast<double>(this->medium.D[j]);
   const double sigma = this->medium.sigma_a ? static_cast<double>(this->medium.sigma_a[j]) : 0.;
   // sigma h^2 / (2 a b / (a + b)), with no product that could underflow
-  const double x = 0.5 * sigma * (1. / a + 1. / b) / this->perArea[d];
+  return 0.5 * sigma * (1. / a + 1. / b) / this->perArea[d];
+}
+
+template <class T>
+double ActiveRegion<T>::step(std::int64_t i, std::int64_t j, int d) const
+{
+  const double x = this->damping(i, j, d);
   return x < 1e30 ? decay(x) : std::numeric_limits<double>::infinity();
 }
 
 template <class T>
-double ActiveRegion<T>::foretell(std::int64_t j) const
+double ActiveRegion<T>::foretell(std::int64_t j, const Index& at) const
 {
   const std::array<int, 3>& n = this->medium.grid.dims;
-  const int at[3] = { static_cast<int>(j % n[0]), static_cast<int>(j / n[0] % n[1]),
-    static_cast<int>(j / this->stride[2]) };
   // along each axis the better of two neighbours
   constexpr double never = std::numeric_limits<double>::infinity();
   double from[3] = { never, never, never };
@@ -149,13 +166,11 @@ void ActiveRegion<T>::push(std::int64_t i, double value)
 }
 
 template <class T>
-void ActiveRegion<T>::widen(std::int64_t i)
+void ActiveRegion<T>::widen(const Index& at)
 {
   const std::array<int, 3>& n = this->medium.grid.dims;
-  const std::int64_t row = i / n[0];
-  Span& span =
-    this->hull[this->tileRow(static_cast<int>(row % n[1]), static_cast<int>(row / n[1]))];
-  const int x = static_cast<int>(i - row * n[0]);
+  Span& span = this->hull[this->tileRow(at[1], at[2])];
+  const int x = at[0];
   if (span.begin >= span.end)
   {
     span = { x, x };
@@ -376,15 +391,13 @@ bool ActiveRegion<T>::fills(double largest) const
 
 //------------------------------------------------------------------------------
 template <class T>
-void ActiveRegion<T>::spread(std::int64_t i)
+void ActiveRegion<T>::spread(std::int64_t i, const Index& at)
 {
   if (!this->open(i))
   {
     return;
   }
   const std::array<int, 3>& n = this->medium.grid.dims;
-  const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>(i / n[0] % n[1]),
-    static_cast<int>(i / this->stride[2]) };
   for (int d = 0; d < 3; ++d)
   {
     for (int side = -1; side <= 1; side += 2)
@@ -394,7 +407,9 @@ void ActiveRegion<T>::spread(std::int64_t i)
       {
         continue;
       }
-      const double now = this->foretell(j);
+      Index there = at;
+      there[d] += side;
+      const double now = this->foretell(j, there);
       const bool news = this->state[j] == Unknown ||
         now < static_cast<double>(this->cost[j]) - (this->state[j] == Dark ? Brighter : 0.);
       if (news)
@@ -406,14 +421,24 @@ void ActiveRegion<T>::spread(std::int64_t i)
 }
 
 template <class T>
-bool ActiveRegion<T>::advance(std::int64_t limit)
+double ActiveRegion<T>::grow(double at, std::int64_t all, std::int64_t half) const
 {
-  const std::array<int, 3>& n = this->medium.grid.dims;
+  const double most = static_cast<double>(std::max(all, half));
+  const double power = std::log2(most / static_cast<double>(std::max<std::int64_t>(1, half)));
+  return static_cast<double>(all) *
+    std::pow(std::max(1., this->budget / at), std::min(3., std::max(1., power)));
+}
+
+template <class T>
+bool ActiveRegion<T>::advance(std::int64_t limit, std::int64_t more)
+{
   this->numberTaken = 0;
   bool ended = true;
   this->outgrown = 0;
+  std::vector<std::int64_t> before; // how many were lit when a bucket's turn came
   for (std::size_t bucket = 0; bucket < this->queue.size(); ++bucket)
   {
+    before.push_back(this->numberLit);
     std::vector<std::int64_t>& same = this->queue[bucket];
     // grows while it is read
     for (std::size_t p = 0; p < same.size(); ++p)
@@ -422,6 +447,13 @@ bool ActiveRegion<T>::advance(std::int64_t limit)
       if (this->state[i] != Trial)
       {
         continue; // came by a shorter way
+      }
+      if (this->numberTaken >= limit && more > 0)
+      {
+        const double reached = QueueStep * static_cast<double>(bucket + 1);
+        const double all = this->grow(reached, this->numberLit, before[(bucket + 1) / 2]);
+        limit += all < static_cast<double>(this->numberLit + more) ? more : 0;
+        more = 0;
       }
       if (this->numberTaken >= limit)
       {
@@ -432,12 +464,11 @@ bool ActiveRegion<T>::advance(std::int64_t limit)
       ++this->numberTaken;
       ++this->numberLit;
       this->state[i] = Lit;
-      this->widen(i);
-      const int at[3] = { static_cast<int>(i % n[0]), static_cast<int>(i / n[0] % n[1]),
-        static_cast<int>(i / this->stride[2]) };
-      const Span& span = this->solved[this->tileRow(at[1], at[2])];
-      this->outgrown += at[0] < span.begin || at[0] >= span.end;
-      this->spread(i);
+      const Index here = this->at(i);
+      this->widen(here);
+      const Span& span = this->solved[this->tileRow(here[1], here[2])];
+      this->outgrown += here[0] < span.begin || here[0] >= span.end;
+      this->spread(i, here);
     }
     same.clear();
   }
@@ -460,19 +491,22 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
   const std::vector<Span> domain = this->spans();
   const auto forEach = [&](auto&& action)
   {
+    Index at{ { 0, 0, 0 } };
     for (std::size_t r = 0; r < domain.size(); ++r)
     {
       const std::int64_t o = static_cast<std::int64_t>(r) * n[0];
-      for (std::int64_t i = o + domain[r].begin; i < o + domain[r].end; ++i)
+      for (at[0] = domain[r].begin; at[0] < domain[r].end; ++at[0])
       {
-        action(r, i);
+        action(at, o + at[0]);
       }
+      at[2] += at[1] + 1 == n[1];
+      at[1] = at[1] + 1 == n[1] ? 0 : at[1] + 1;
     }
   };
   double largest = 0.;
   double squares = 0.;
   forEach(
-    [&](std::size_t, std::int64_t i)
+    [&](const Index&, std::int64_t i)
     {
       largest = std::max(largest, std::abs(phi[i]));
       squares += phi[i] * phi[i];
@@ -486,50 +520,48 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
   const auto costOf = [&](std::int64_t i)
   {
     const double part = std::abs(phi[i]) / largest;
-    return part > 1e-30 ? -std::log(part) : 70.;
+    return part > 1e-30 ? -std::log(static_cast<float>(part)) : 70.f;
   };
-  const double keep = giveUp ? this->budget + Spare : 1e30;
+  const float keep = giveUp ? static_cast<float>(this->budget + Spare) : 1e30f;
   this->numberLit = 0;
   forEach(
-    [&](std::size_t, std::int64_t i)
+    [&](const Index& at, std::int64_t i)
     {
-      const double c = costOf(i);
-      this->cost[i] = static_cast<float>(c);
+      const float c = costOf(i);
+      this->cost[i] = c;
       this->state[i] = c <= keep ? Lit : Dark;
       if (c <= keep)
       {
         ++this->numberLit;
-        this->widen(i);
+        this->widen(at);
       }
     });
   for (const std::int64_t i : this->sources)
   {
     this->state[i] = Lit;
-    this->widen(i);
+    this->widen(this->at(i));
   }
   // 2. the rim
   std::vector<std::pair<std::int64_t, double>> front;
   forEach(
-    [&](std::size_t r, std::int64_t i)
+    [&](const Index& at, std::int64_t i)
     {
-      const int at[3] = { static_cast<int>(i - static_cast<std::int64_t>(r) * n[0]),
-        static_cast<int>(r % static_cast<std::size_t>(n[1])),
-        static_cast<int>(r / static_cast<std::size_t>(n[1])) };
-      double lost = 0.;
+      double least = 1.; // of what a cut keeps of phi beside it
       double missing = 0.;
       for (int d = 0; d < 3; ++d)
       {
         for (int side = -1; side <= 1; side += 2)
         {
-          if (at[d] + side < 0 || at[d] + side >= n[d])
+          Index next = at;
+          next[d] += side;
+          if (next[d] < 0 || next[d] >= n[d])
           {
             continue;
           }
-          const int x = at[0] + (d == 0 ? side : 0);
           const Span& there =
-            domain[d == 0 ? r : r + static_cast<std::size_t>(d == 1 ? side : side * n[1])];
+            domain[static_cast<std::size_t>(next[1] + static_cast<std::int64_t>(n[1]) * next[2])];
           const std::int64_t j = i + side * this->stride[d];
-          if ((x >= there.begin && x < there.end) || !this->open(i) || !this->open(j))
+          if ((next[0] >= there.begin && next[0] < there.end) || !this->open(i) || !this->open(j))
           {
             continue;
           }
@@ -537,18 +569,20 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
           const double b = static_cast<double>(this->medium.D[j]);
           const double out = 2. * a * (b / (a + b)) * this->perArea[d] * phi[i];
           rim.leaked += out;
-          // phi goes as sinh there: the voxel behind tells how fast
+          // phi goes as sinh there: the voxel behind tells how fast, or the medium
           const std::int64_t behind = i - side * this->stride[d];
           const bool known = at[d] - side >= 0 && at[d] - side < n[d];
           const double before = known ? 0.5 * std::abs(phi[behind]) : 0.;
           const double here = std::abs(phi[i]);
           const double ratio = before > here && before < 1e100 * here ? before / here : 1.;
-          const double measured = std::log(ratio + std::sqrt(ratio * ratio - 1.));
-          const double c = std::max({ 0.1, measured, this->step(i, j, d) });
-          const double kept = -std::expm1(-2. * c);
-          lost = std::max(lost, -std::log(kept));
+          const double x = std::min(1e100, this->damping(i, j, d));
+          // e^-c, 0.1 the least c
+          const double decayed = std::min({ 0.905, 1. / (ratio + std::sqrt(ratio * ratio - 1.)),
+            1. / (1. + 0.5 * x + std::sqrt(x + 0.25 * x * x)) });
+          const double kept = 1. - decayed * decayed;
+          least = std::min(least, kept);
           // phi beyond, were it not cut, and farther on
-          const double passed = std::exp(-c) / kept;
+          const double passed = decayed / kept;
           missing += out * passed;
           rim.beyond += phi[i] * passed * (phi[i] * passed) / kept;
         }
@@ -557,10 +591,13 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
       {
         rim.missing.emplace_back(i, missing);
       }
-      if (lost > 0. && this->state[i] == Lit &&
-        static_cast<double>(this->cost[i]) - lost <= this->budget)
+      if (least < 1. && this->state[i] == Lit)
       {
-        front.emplace_back(i, lost);
+        const double lost = -std::log(least);
+        if (static_cast<double>(this->cost[i]) - lost <= this->budget)
+        {
+          front.emplace_back(i, lost);
+        }
       }
     });
   rim.leaked *= this->medium.grid.voxelVolume();
@@ -571,7 +608,7 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
     sum += static_cast<double>(this->cost[voxel.first]);
     this->cost[voxel.first] -= static_cast<float>(voxel.second);
   }
-  // 3. in a vessel N(c) grows as c, in open matter as c^3
+  // 3. how far it will grow
   rim.expected = static_cast<double>(this->numberLit);
   if (!front.empty())
   {
@@ -579,20 +616,16 @@ typename ActiveRegion<T>::Rim ActiveRegion<T>::learn(const double* phi, bool giv
     std::int64_t all = 0;
     std::int64_t half = 1;
     forEach(
-      [&](std::size_t, std::int64_t i)
+      [&](const Index&, std::int64_t i)
       {
         all += static_cast<double>(this->cost[i]) <= mean;
         half += static_cast<double>(this->cost[i]) <= 0.5 * mean;
       });
-    const double power = std::min(3.,
-      std::max(
-        1., std::log2(static_cast<double>(std::max(all, half)) / static_cast<double>(half))));
-    rim.expected = std::max(
-      rim.expected, static_cast<double>(all) * std::pow(std::max(1., this->budget / mean), power));
+    rim.expected = std::max(rim.expected, this->grow(mean, all, half));
   }
   for (const auto& voxel : front)
   {
-    this->spread(voxel.first);
+    this->spread(voxel.first, this->at(voxel.first));
   }
   return rim;
 }

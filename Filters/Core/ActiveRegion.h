@@ -23,6 +23,7 @@
 #include "Core/Buffer.h"
 #include "Core/Diffusion.h"
 
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -43,8 +44,11 @@ public:
   template <class Q>
   bool start(const Q* q, double largest, const ParallelFor& parallelFor);
 
-  /** Lets the front take up to `limit` voxels; true where it has come to its end. */
-  bool advance(std::int64_t limit);
+  /**
+   * Lets the front take up to `limit` voxels, and up to `more` where it foretells by then that
+   * these bring it to its end; true where it has come there.
+   */
+  bool advance(std::int64_t limit, std::int64_t more = 0);
   /** How many it took the last time. */
   std::int64_t taken() const { return this->numberTaken; }
   /** Whether that went beyond what the last field was solved for on, by more than a few voxels. */
@@ -89,15 +93,31 @@ private:
     return !(this->medium.outside && this->medium.outside[i]) &&
       static_cast<double>(this->medium.D[i]) > 1e-150;
   }
-  /** c of the step from i to its neighbour j along axis d. */
+  using Index = std::array<int, 3>;
+  Index at(std::int64_t i) const
+  {
+    const std::array<int, 3>& n = this->medium.grid.dims;
+    const std::int64_t row = i / n[0];
+    const int k = static_cast<int>(row / n[1]);
+    return { { static_cast<int>(i - row * n[0]),
+      static_cast<int>(row - static_cast<std::int64_t>(n[1]) * k), k } };
+  }
+  /** 2 (cosh c - 1) of the step from i to its neighbour j along axis d. */
+  double damping(std::int64_t i, std::int64_t j, int d) const;
+  /** c of that step. */
   double step(std::int64_t i, std::int64_t j, int d) const;
   /** The cost of voxel j from its lit neighbours. */
-  double foretell(std::int64_t j) const;
+  double foretell(std::int64_t j, const Index& at) const;
   void push(std::int64_t i, double cost);
   bool fills(double largest) const;
+  /**
+   * How many voxels will be lit at the largest cost, of `all` at `cost` and `half` at half of it:
+   * N(c) grows as c in a vessel, as c^3 in open matter.
+   */
+  double grow(double cost, std::int64_t all, std::int64_t half) const;
   /** Foretells the neighbours of a lit voxel. */
-  void spread(std::int64_t i);
-  void widen(std::int64_t i);
+  void spread(std::int64_t i, const Index& at);
+  void widen(const Index& at);
   /**
    * Rows are taken up together and spans are even: cells of the first coarse grid are whole,
    * without which the cycle may be ten times slower.

@@ -1564,30 +1564,36 @@ void DiffusionSolver::estimateError(const double* phi, const float* z, double sc
   std::vector<Row> rows(static_cast<std::size_t>(op.numberOfRows()));
   const auto forRows = [&](std::int64_t every, auto&& action)
   {
-    ForRows(this->parallelFor, (op.numberOfRows() + every - 1) / every, op.activeSize / every,
-      [&](std::int64_t begin, std::int64_t end)
-      {
-        for (std::int64_t t = begin * every; t < end * every && t < op.numberOfRows(); t += every)
-        {
-          const std::int64_t row = op.row(t);
-          const Span span = op.span(row);
-          action(t, row * op.dims[0] + span.begin, row * op.dims[0] + span.end);
-        }
-      });
+    const std::int64_t some = (op.numberOfRows() + every - 1) / every;
+    ForRows(this->parallelFor, some, op.activeSize / every,
+      [&](std::int64_t begin, std::int64_t end) { action(begin * every, end * every); });
+  };
+  const auto inRow = [&op](std::int64_t t, auto&& action)
+  {
+    const std::int64_t row = op.row(t);
+    const Span span = op.span(row);
+    for (std::int64_t i = row * op.dims[0] + span.begin; i < row * op.dims[0] + span.end; ++i)
+    {
+      action(i);
+    }
   };
   forRows(1,
-    [&](std::int64_t t, std::int64_t from, std::int64_t to)
+    [&](std::int64_t begin, std::int64_t end)
     {
-      Row one;
-      for (std::int64_t i = from; i < to; ++i)
+      for (std::int64_t t = begin; t < end; ++t)
       {
-        const double error = factor * scaled * static_cast<double>(z[i]);
-        const double value = phi[i] + error;
-        one.largest = std::max(one.largest, std::abs(value));
-        one.errors += error * error;
-        one.values += value * value;
+        Row one;
+        inRow(t,
+          [&](std::int64_t i)
+          {
+            const double error = factor * scaled * static_cast<double>(z[i]);
+            const double value = phi[i] + error;
+            one.largest = std::max(one.largest, std::abs(value));
+            one.errors += error * error;
+            one.values += value * value;
+          });
+        rows[static_cast<std::size_t>(t)] = one;
       }
-      rows[static_cast<std::size_t>(t)] = one;
     });
   Row total;
   for (const Row& one : rows)
@@ -1606,28 +1612,32 @@ void DiffusionSolver::estimateError(const double* phi, const float* z, double sc
   std::vector<std::int64_t> counts(std::size_t(1) << (31 - shift), 0);
   std::mutex guard;
   forRows(every,
-    [&](std::int64_t, std::int64_t from, std::int64_t to)
+    [&](std::int64_t begin, std::int64_t end)
     {
       std::vector<std::uint32_t> bins;
-      for (std::int64_t i = from; i < to; ++i)
+      for (std::int64_t t = begin; t < std::min(end, op.numberOfRows()); t += every)
       {
-        const double error = step * static_cast<double>(z[i]);
-        double before = phi[i];
-        double value = before + error;
-        if (sign != 0)
-        {
-          // what has the wrong sign becomes 0
-          before = std::max(0., sign * before);
-          value = std::max(0., sign * value);
-        }
-        if (std::abs(value) >= 1e-6 * total.largest && value != 0.)
-        {
-          const float ratio =
-            static_cast<float>(std::min(std::abs((value - before) / value), 1e30));
-          std::uint32_t bits;
-          std::memcpy(&bits, &ratio, sizeof(bits));
-          bins.push_back(bits >> shift);
-        }
+        inRow(t,
+          [&](std::int64_t i)
+          {
+            const double error = step * static_cast<double>(z[i]);
+            double before = phi[i];
+            double value = before + error;
+            if (sign != 0)
+            {
+              // what has the wrong sign becomes 0
+              before = std::max(0., sign * before);
+              value = std::max(0., sign * value);
+            }
+            if (std::abs(value) >= 1e-6 * total.largest && value != 0.)
+            {
+              const float ratio =
+                static_cast<float>(std::min(std::abs((value - before) / value), 1e30));
+              std::uint32_t bits;
+              std::memcpy(&bits, &ratio, sizeof(bits));
+              bins.push_back(bits >> shift);
+            }
+          });
       }
       const std::lock_guard<std::mutex> lock(guard);
       for (const std::uint32_t bin : bins)
@@ -2815,16 +2825,18 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
   double searched = 0.; // in voxels of a whole volume's solve
   const double mostSearch = control.regionSearch * static_cast<double>(size);
   // true: it has come to its end
-  const auto advance = [&](std::int64_t most)
+  const auto advance = [&](std::int64_t most, std::int64_t more)
   {
-    const bool ended = region.advance(most);
+    const bool ended = region.advance(most, more);
     searched += FrontCost * static_cast<double>(region.taken());
     return ended;
   };
   const auto affordable = [&]
   { return static_cast<std::int64_t>(std::max(0., mostSearch - searched) / FrontCost); };
   const std::int64_t first = std::min(FirstRegion, std::max<std::int64_t>(1024, size / FirstPart));
-  bool complete = advance(std::min(first, affordable()));
+  // as many again cost less than to solve for the first and to begin again
+  const std::int64_t once = std::min(first, affordable());
+  bool complete = advance(once, std::min(first, affordable() - once));
   DiffusionControl rough;
   rough.tolerance = std::max(control.tolerance, 1e-8);
   rough.targetError = std::max(control.targetError, 0.3);
@@ -2939,7 +2951,7 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
         RoughCost * static_cast<double>(active + next) + RoundCost;
       most = searched + round > mostSearch ? affordable() : next;
     }
-    const bool ended = advance(most);
+    const bool ended = advance(most, 0);
     if ((complete && !region.grown()) || late)
     {
       // Light that decays slowly, or not at all, may leave through a rim that looks dark.

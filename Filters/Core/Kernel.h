@@ -70,7 +70,7 @@ private:
 };
 
 /** Below this many values a loop is not worth a thread. */
-constexpr std::int64_t ParallelGrain = 32768;
+constexpr std::int64_t ParallelGrain = 8192;
 
 /** body(begin, end) over [0, rows) of rows that hold `values` values in all. */
 inline void ForRows(

@@ -66,7 +66,7 @@ class WatchedFor
       std::int64_t piece = n / 256;
       for (std::int64_t begin = 0; begin < n;)
       {
-        piece = std::max<std::int64_t>(8, std::min(most, piece)); // for all threads
+        piece = std::max<std::int64_t>(8, piece); // for all threads
         const double began = now();
         const std::int64_t length = std::min(piece, n - begin);
         this->plain(
@@ -74,6 +74,8 @@ class WatchedFor
         begin += length;
         const double took = now() - began;
         piece = took < 2e-3 ? 4 * piece : took > 8e-3 ? piece / 2 : piece;
+        // of what took next to nothing, four times as much may even be in fresh memory
+        piece = took < 2e-4 ? piece : std::min(most, piece);
         this->poll();
       }
     }
