@@ -949,15 +949,29 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     const double perPoint = this->TimeBudget / static_cast<double>(size);
     // Light that stays where it is: its region alone. To find out costs some per cent of a solve,
     // which goes on from what that came to.
-    if (!(this->TimeBudget > 0. && this->TimeBudget < 0.06))
+    // A constant medium is solved for at once, where that is found out.
+    const bool known = kept.valid && key == kept.key;
+    const bool constant = known && kept.solver.hasConstantMedium();
+    if (!constant && !(this->TimeBudget > 0. && this->TimeBudget < 0.06))
     {
-      lighttransport::DiffusionSolver regional(vtkLightTransportParallelFor());
+      lighttransport::DiffusionSolver beside(vtkLightTransportParallelFor());
+      lighttransport::DiffusionSolver& regional = known ? beside : kept.solver;
+      kept.valid = known;
       lighttransport::DiffusionControl own = control;
       own.timeBudget = this->TimeBudget > 0. ? timeLeft() : 0.;
       own.regionOrNothing = true;
+      own.fromZero = !started;
       own.largestRegion = 0.125;
       before = withMedium([&](const auto& medium)
         { return regional.solveActive(medium, q, phi.data(), own, this->ActiveThreshold); });
+      if (regional.hasConstantMedium())
+      {
+        kept.solutions.clear();
+        kept.moment.reset();
+        kept.valid = true;
+        kept.key = key;
+        return before;
+      }
       using lighttransport::StopReason;
       const bool whole = before.activeFraction == 1. && before.reason == StopReason::MaxIterations;
       const bool failed = before.reason == StopReason::NotFinite ||
@@ -1079,6 +1093,7 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
     }
     if (active)
     {
+      control.fromZero = true;
       return withMedium([&](const auto& medium)
         { return kept.solver.solveActive(medium, q, phi.data(), control, this->ActiveThreshold); });
     }

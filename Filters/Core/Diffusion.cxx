@@ -385,6 +385,11 @@ LIGHTTRANSPORT_SIMD
 void combine(std::int64_t n, float beta, const float* LIGHTTRANSPORT_RESTRICT z,
   float* LIGHTTRANSPORT_RESTRICT p)
 {
+  if (beta == 0.f)
+  {
+    std::copy(z, z + n, p); // fresh memory is not read
+    return;
+  }
   for (std::int64_t i = 0; i < n; ++i)
   {
     p[i] = z[i] + beta * p[i];
@@ -1751,6 +1756,10 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   const double goal = control.tolerance * bNorm;
 
   // From darkness the residual is b.
+  if (this->A.spans.empty())
+  {
+    Touch(phi, size, this->parallelFor);
+  }
   const bool dark = this->isZero(phi);
   Buffer<float> r(size, this->A.pages);
   double rScale = bNorm; // r holds the residual divided by it
@@ -1790,7 +1799,6 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     this->storeFaces();
   }
   this->prepareMultigrid(loop);
-  Touch(phi, size, this->parallelFor);
   const DiffusionOperator& op = this->A;
   Buffer<float> Ap(size, this->A.pages);
   Buffer<float> p(size, this->A.pages);
@@ -2116,6 +2124,7 @@ void DiffusionSolver::solveConstant(
     report.reason = StopReason::Converged;
     return;
   }
+  Touch(phi, size, this->parallelFor);
   const bool dark = this->isZero(phi);
   double rNorm = dark || !std::isfinite(bNorm) ? bNorm : this->residual<T>(b, phi, nullptr, 1.);
   report.fineApplications += dark ? 0. : 1.;
@@ -2171,7 +2180,6 @@ void DiffusionSolver::solveConstant(
       }
     }
     // 3. phi += x, where that is better
-    Touch(phi, size, this->parallelFor);
     const auto add = [&](double sign)
     {
       ForEachRow(this->A, this->parallelFor.whole(),
@@ -2759,7 +2767,10 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
         }
       });
   };
-  darken();
+  if (!control.fromZero)
+  {
+    darken();
+  }
   if (this->isConstant)
   {
     this->describe(medium); // solved at once: no part of it costs less
@@ -2875,7 +2886,14 @@ DiffusionReport DiffusionSolver::active(const DiffusionMedium<T>& medium, const 
         [&](std::int64_t from, std::int64_t to, int n)
         {
           std::copy(q + from, q + from + n, source.data() + to);
-          std::copy(phi + from, phi + from + n, field.data() + to);
+          if (round == 0)
+          {
+            std::fill(field.data() + to, field.data() + to + n, 0.); // as phi is
+          }
+          else
+          {
+            std::copy(phi + from, phi + from + n, field.data() + to);
+          }
         });
       const std::int64_t nx = this->volume.dims[0];
       const std::vector<Span> domain = region.domain();

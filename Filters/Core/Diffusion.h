@@ -147,6 +147,9 @@ struct DiffusionControl
    * knows another way.
    */
   bool regionOrNothing = false;
+  /** Of solveActive: phi is known to be 0. Fresh memory that need not be looked at costs nothing.
+   */
+  bool fromZero = false;
   /**
    * Called with the field reached: after the first iteration, step or correction that ends so many
    * seconds or more after the solve began, or after the last call returned.
@@ -275,6 +278,8 @@ public:
   bool flux(const double* phi, T* E, const ProgressFunction& progress = {}) const;
 
   const Grid& grid() const { return this->volume; }
+  /** Is the medium the same everywhere, so that it is solved for at once (ConstantMedium.h)? */
+  bool hasConstantMedium() const { return this->isConstant; }
 
 private:
   friend class CoarseDiffusion;

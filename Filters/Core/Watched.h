@@ -125,6 +125,8 @@ private:
 /**
  * Writes to each page of memory what stands there: the system hands it out now, in pieces that can
  * be interrupted, and not in a pass that cannot. Fresh memory may take a second for a gigabyte.
+ * In one access that reads and writes: a page that is read first is lent, and costs ten times as
+ * much when it is written to.
  */
 template <class T>
 void Touch(T* values, std::int64_t n, const WatchedFor& loop)
@@ -136,9 +138,13 @@ void Touch(T* values, std::int64_t n, const WatchedFor& loop)
     {
       for (std::int64_t i = begin; i < end; ++i)
       {
+#if defined(__GNUC__) || defined(__clang__)
+        __atomic_fetch_or(reinterpret_cast<unsigned char*>(values + i * page), 0, __ATOMIC_RELAXED);
+#else
         volatile T& value = values[i * page];
         const T same = value;
         value = same;
+#endif
       }
     });
 }
