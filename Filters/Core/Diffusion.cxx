@@ -1963,32 +1963,46 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
     // 4. alpha = r . p / p . A p, with A p = A z + beta A p_old but where the residual was
     //    recomputed: there A p is as well, and r . p, which is r . z else
     double pAp = 0.;
-    rp = rz;
-    if (fresh || frugal)
-    {
-      ForEachRow(op, loop,
-        [&](std::int64_t, std::int64_t o, int n)
-        { combine(n, static_cast<float>(beta), z.data() + o, p.data() + o); });
-      pAp = Apply(op, p.data(), Ap.data(), loop);
-    }
-    else
-    {
-      pAp = Advance(op, z.data(), static_cast<float>(beta), p.data(), Ap.data(), loop);
-    }
     // What grows has lost its directions to float's rounding.
     least = std::min(least, rzOfPhi);
     careful = careful || rzOfPhi > 4. * least;
-    if ((fresh || careful) && beta != 0.)
+    // A recomputed r has parts along p that the last step should have taken, as has one that
+    // was rounded: with r . z the step would be too long by far, and every one after it again.
+    const bool measured = (fresh || careful) && beta != 0.;
+    const auto alongResidual = [&]
     {
-      // A recomputed r has parts along p that the last step should have taken, as has one that
-      // was rounded: with r . z the step would be too long by far, and every one after it again.
-      rp = SumEachRow(op, loop,
+      return SumEachRow(op, loop,
         [&](std::int64_t, std::int64_t o, int n)
         {
           double sums[2];
           twoDots(n, p.data() + o, r.data() + o, r.data() + o, sums);
           return sums[0];
         });
+    };
+    if (fresh || frugal)
+    {
+      const auto combineWith = [&](float factor)
+      {
+        ForEachRow(op, loop,
+          [&](std::int64_t, std::int64_t o, int n)
+          { combine(n, factor, z.data() + o, p.data() + o); });
+      };
+      combineWith(static_cast<float>(beta));
+      rp = measured ? alongResidual() : rz;
+      if (frugal && measured && !(rp > 0.5 * rz && rp < 2. * rz))
+      {
+        // Fletcher and Reeves's form never comes back from a direction across the residual
+        // (Powell 1977, Math. Program. 12, 241): steps along it are short, and the next one is the
+        // same again.
+        combineWith(0.f);
+        rp = rz;
+      }
+      pAp = Apply(op, p.data(), Ap.data(), loop);
+    }
+    else
+    {
+      pAp = Advance(op, z.data(), static_cast<float>(beta), p.data(), Ap.data(), loop);
+      rp = measured ? alongResidual() : rz;
     }
     fresh = false;
     report.fineApplications += 1.;
