@@ -31,8 +31,8 @@
  *      faces (a symmetric M-matrix: emitted = absorbed + escaped); kept until the
  *      medium changes;
  *   3. solve: Steady by conjugate gradients with one multigrid cycle as
- *      preconditioner, until the residual, recomputed in double precision, is below
- *      the tolerance; or time steps, Explicit (forward Euler) or Implicit (backward
+ *      preconditioner (of aggregates where that stalls; a constant medium directly), until
+ *      the residual, recomputed in double precision, is below the tolerance; or time steps, Explicit (forward Euler) or Implicit (backward
  *      Euler or SDIRK2, both L-stable), from phi = 0 or from the last state;
  *   4. write the arrays, and the report into getters and field data
  *      (`LightDiffusionReport.*`), so that a saved file says how it was made.
@@ -149,7 +149,7 @@ public:
   ///@}
 
   ///@{
-  /** Of the linear solver (Implicit: in each step); >= 1, default 500. 10 to 40 are usual. */
+  /** Of the linear solver (Implicit: in each step); >= 1, default 500. 5 to 40 are usual. */
   vtkSetMacro(MaximumNumberOfIterations, int);
   vtkGetMacro(MaximumNumberOfIterations, int);
   ///@}
