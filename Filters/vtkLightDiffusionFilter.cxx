@@ -797,11 +797,12 @@ bool vtkLightDiffusionFilter::Solve(vtkImageData* input, vtkImageData* output, s
       medium.refractiveIndexRatio = this->RefractiveIndexRatio;
       return action(medium);
     };
-    if (D->GetDataType() == VTK_FLOAT && (!sigma_a || sigma_a->GetDataType() == VTK_FLOAT))
+    // What a kept solver looks at again must lie in the arrays themselves, or be kept with it.
+    vtkFloatArray* floatD = vtkFloatArray::FastDownCast(D);
+    vtkFloatArray* floatSigma = vtkFloatArray::FastDownCast(sigma_a);
+    if (floatD && (floatSigma || !sigma_a))
     {
-      lighttransport::Buffer<float> unused;
-      return act(0.f, valuesOf<float, vtkFloatArray>(D, unused, parallel),
-        sigma_a ? valuesOf<float, vtkFloatArray>(sigma_a, unused, parallel) : nullptr);
+      return act(0.f, floatD->GetPointer(0), floatSigma ? floatSigma->GetPointer(0) : nullptr);
     }
     return act(0., valuesOf<double, vtkDoubleArray>(D, kept.storedD, parallel),
       sigma_a ? valuesOf<double, vtkDoubleArray>(sigma_a, kept.storedSigma, parallel) : nullptr);

@@ -14,6 +14,7 @@
 #include "vtkMatrix3x3.h"
 #include "vtkOpticalMediumFilter.h"
 #include "vtkSMPTools.h"
+#include "vtkSOADataArrayTemplate.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkTrivialProducer.h"
@@ -40,6 +41,7 @@ void addArray(vtkImageData* image, const char* name, const Function& f)
 {
   vtkNew<ArrayT> array;
   array->SetName(name);
+  array->SetNumberOfComponents(1); // SOA arrays have no default
   array->SetNumberOfTuples(image->GetNumberOfPoints());
   int dims[3];
   image->GetDimensions(dims);
@@ -244,6 +246,22 @@ void types(Suite& suite)
   doubles->SetInputData(mixed);
   doubles->Update();
   LT_CHECK(suite, fluenceAt(floats, 2, 3, 4) == fluenceAt(doubles, 2, 3, 4));
+
+  // floats whose values do not lie in one block
+  using Apart = vtkSOADataArrayTemplate<float>;
+  for (const double error : { 0., 1e-5 })
+  {
+    auto apart = scene<Apart>(9, 0.5, 0.25, 4, 4, 4, 2.);
+    apart->GetPointData()->GetArray("DiffusionCoefficient")->SetComponent(0, 0, 0.25);
+    vtkNew<Filter> blocks;
+    blocks->SetInputData(apart);
+    blocks->SetTargetError(error);
+    blocks->Update();
+    vtkNew<Filter> plain;
+    plain->SetInputData(unevenScene(9, 0.5, 0.25, 4, 2.));
+    plain->Update();
+    LT_CHECK_CLOSE(suite, fluenceAt(blocks, 2, 3, 4), fluenceAt(plain, 2, 3, 4), 1e-5);
+  }
 
   // float holds neither 1e30 / 1e-10^3 nor its fluence; double does, and the error says so
   auto huge = scene<vtkDoubleArray>(5, 1., 1., 2, 2, 2, 1e60);
@@ -534,6 +552,34 @@ void frugal(Suite& suite)
   full->SetIntermediateInterval(1e-9);
   full->Update();
   LT_CHECK(suite, show->count >= 2);
+}
+
+/** A constant medium to a named error, again with another light, and then another medium. */
+void constantToAnError(Suite& suite)
+{
+  vtkNew<Filter> named;
+  named->SetTargetError(0.01);
+  const auto agree = [&](vtkImageData* image, int x, double within)
+  {
+    vtkNew<Filter> full;
+    full->SetInputData(image);
+    full->Update();
+    named->SetInputData(image);
+    named->Update();
+    LT_CHECK(suite, named->GetStopReason() == Filter::Converged);
+    LT_CHECK(suite, named->GetEstimatedError() >= 0. && named->GetEstimatedError() <= 0.01);
+    LT_CHECK_CLOSE(suite, fluenceAt(named, x, 9, 9), fluenceAt(full, x, 9, 9), within);
+  };
+  auto image = scene(20, 0.5, 0.05, 4, 9, 9, 2.);
+  agree(image, 6, 1e-6);
+  LT_CHECK(suite, named->GetNumberOfIterationsUsed() == 1);
+  addArray<vtkFloatArray>(
+    image, "Source", [](int i, int j, int k) { return i == 15 && j == 9 && k == 9 ? 3. : 0.; });
+  agree(image, 13, 1e-6);
+  LT_CHECK(suite, named->GetNumberOfIterationsUsed() == 1);
+  agree(unevenScene(20, 0.5, 0.05, 9, 2.), 12, 0.02);
+  LT_CHECK(suite, named->GetNumberOfIterationsUsed() > 1);
+  agree(image, 13, 1e-6);
 }
 
 /** Cells of two and four points, on request or because a named error has it so. */
@@ -894,6 +940,7 @@ int main(int argc, char* argv[])
   anisotropicDiffusion(suite);
   progress(suite);
   frugal(suite);
+  constantToAnError(suite);
   coarser(suite);
   namedExtremes(suite);
   superposition(suite);
