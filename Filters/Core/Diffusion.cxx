@@ -3102,6 +3102,13 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
     }
     if (report.reason != StopReason::Converged)
     {
+      if (report.reason == StopReason::NotFinite && solve % stages == 0)
+      {
+        report.message = "a value is not finite; the field is that before the step";
+        ForRows(this->parallelFor.whole(), size, size,
+          [&](std::int64_t begin, std::int64_t end)
+          { std::copy(previous.data() + begin, previous.data() + end, phi + begin); });
+      }
       if (report.reason == StopReason::MaxIterations) // else the reason of steps that are all made
       {
         std::ostringstream text;

@@ -4,6 +4,7 @@
  * Hard media: the answer's residual is recomputed here, from the equations, and
  * the iterations are bounded. Then what has no answer, and what stops early.
  */
+#include "Core/Coarse.h"
 #include "Core/FirstMoment.h"
 #include "HardMedia.h"
 #include "LightTransportTesting.h"
@@ -616,43 +617,100 @@ void cancelling(Suite& suite)
   std::cout << solved << " of " << runs << " cancelling scenes solved\n";
 }
 
-/** A NaN appears in the field while a solver works on it: it is seen, and never called solved. */
+/**
+ * A NaN appears in the field, once, while a solver works on it: it is seen, and never called
+ * solved. The region solves on a field of its own, and implicit steps have the one before.
+ */
 void notFinite(Suite& suite)
 {
   const Suite::WithoutTraps quiet;
+  enum Kind
+  {
+    Steady,
+    Constant,
+    Explicit,
+    Local,
+    Implicit,
+    SecondOrder,
+    ImplicitConstant,
+    Moment,
+    Region,
+    Coarse,
+    End
+  };
   for (const double bad :
     { std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e308 })
   {
-    for (int kind = 0; kind < 6; ++kind)
+    for (int kind = 0; kind < End; ++kind)
     {
       DiffusionScene scene({ { 12, 12, 12 } }, { { 1., 1., 1. } });
-      scene.sigma_a.assign(scene.q.size(), 1e-2);
-      scene.D[5] = kind == 5 ? 1. : 0.3; // 5: constant
+      scene.sigma_a.assign(scene.q.size(), kind == Region ? 1. : 1e-2);
+      scene.D.assign(scene.q.size(), kind == Region ? 1e-2 : 1.);
+      scene.D[5] = kind == Constant || kind == ImplicitConstant ? 1. : 0.3;
       scene.q[scene.index(5, 6, 7)] = 1.;
       DiffusionSolver solver;
       FirstMomentSolver moment;
+      CoarseDiffusion coarse;
       solver.setMedium(scene.medium());
       moment.setMedium(scene.medium());
+      coarse.setMedium(scene.medium(), 2);
       DiffusionControl control;
       control.tolerance = 1e-10;
+      control.largestRegion = control.regionSearch = 1.;
+      control.implicitScheme =
+        kind == SecondOrder ? ImplicitScheme::SecondOrder : ImplicitScheme::BackwardEuler;
       double* phi = scene.phi.data();
+      const std::size_t at = scene.index(5, 6, 7) + 1;
+      int times = 0;
       control.progress = [&](double fraction)
       {
-        phi[800] = fraction > 0. ? bad : phi[800]; // explicit steps: every second one reads it
+        // what is told the fraction of is a whole step or iteration: explicit ones stand in phi
+        // after two of five
+        if (times == 0 && (fraction > (kind == Coarse ? 0.05 : 0.3) || kind == Region))
+        {
+          phi[at] = bad;
+          ++times;
+        }
         return true;
       };
       const double* q = scene.q.data();
-      const double cdt = 0.5 * solver.positivityBound();
-      const DiffusionReport report = kind == 0 || kind == 5 ? solver.solveSteady(q, phi, control)
-        : kind == 1 ? solver.stepExplicit(q, phi, 5, cdt, control)
-        : kind == 2 ? solver.stepLocal(q, phi, 5, 1., control)
-        : kind == 3 ? solver.stepImplicit(q, phi, 5, cdt, control)
-                    : static_cast<DiffusionReport>(
-                        moment.step(q, phi, 5, 0.5 * moment.courantBound(), control));
+      const double cdt = (kind == Explicit ? 0.5 : 5.) * solver.positivityBound();
+      const auto solve = [&]() -> DiffusionReport
+      {
+        switch (kind)
+        {
+          case Steady:
+          case Constant:
+            return solver.solveSteady(q, phi, control);
+          case Explicit:
+            return solver.stepExplicit(q, phi, 5, cdt, control);
+          case Local:
+            return solver.stepLocal(q, phi, 5, 1., control);
+          case Moment:
+            return moment.step(q, phi, 5, 0.5 * moment.courantBound(), control);
+          case Region:
+            return solver.solveActive(scene.medium(), q, phi, control, 1e-6);
+          case Coarse:
+            return coarse.solve(q, phi, control);
+          default:
+            return solver.stepImplicit(q, phi, 5, cdt, control);
+        }
+      };
+      const DiffusionReport report = solve();
       const std::string name = "kind " + std::to_string(kind) + ", " + std::to_string(bad) + ": " +
-        ToString(report.reason);
+        ToString(report.reason) + ", " + report.message;
       // what is too large for its square is no number either, where a norm is taken
-      suite.check(report.reason == StopReason::NotFinite, name, __FILE__, __LINE__);
+      const bool kept = kind == Region || kind == Implicit;
+      suite.check(times == 1, name + ": never there", __FILE__, __LINE__);
+      suite.check(report.reason == (kind == Region ? StopReason::Converged : StopReason::NotFinite),
+        name, __FILE__, __LINE__);
+      suite.check(kind != Region || report.activeFraction < 1., name, __FILE__, __LINE__);
+      suite.check(!kept ||
+          std::all_of(scene.phi.begin(), scene.phi.end(),
+            [](double v) { return std::isfinite(v) && v < 1e10; }),
+        name + ": the field", __FILE__, __LINE__);
+      suite.check(!kept || *std::max_element(scene.phi.begin(), scene.phi.end()) > 0.,
+        name + ": dark", __FILE__, __LINE__);
     }
   }
 }
