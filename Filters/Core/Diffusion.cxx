@@ -270,6 +270,62 @@ double squaresRow(int n, const double* q, double scale, double mean)
 {
   return squaresOf(n, q, scale, mean);
 }
+/** 1: there are values above 0, 2: below; by their bits, for a NaN must not be compared. */
+template <class Bits, class T>
+LIGHTTRANSPORT_INLINE std::uint8_t signsIn(int n, const T* LIGHTTRANSPORT_RESTRICT q)
+{
+  Bits above = 0;
+  Bits below = 0;
+  for (int i = 0; i < n; ++i)
+  {
+    const T value = q[i];
+    Bits bits;
+    std::memcpy(&bits, &value, sizeof(T));
+    above |= bits > 0 ? 1 : 0;
+    below |= bits < 0 && bits != std::numeric_limits<Bits>::min() ? 1 : 0; // -0 is 0
+  }
+  return static_cast<std::uint8_t>((above ? 1 : 0) | (below ? 2 : 0));
+}
+LIGHTTRANSPORT_SIMD
+std::uint8_t signsOf(int n, const float* q)
+{
+  return signsIn<std::int32_t>(n, q);
+}
+LIGHTTRANSPORT_SIMD
+std::uint8_t signsOf(int n, const double* q)
+{
+  return signsIn<std::int64_t>(n, q);
+}
+
+/** The least and the largest of a row that holds numbers, and of what is given. */
+LIGHTTRANSPORT_SIMD
+void extremes(int n, const double* LIGHTTRANSPORT_RESTRICT a, double& least, double& most)
+{
+  double low[8];
+  double high[8];
+  std::fill(low, low + 8, least);
+  std::fill(high, high + 8, most);
+  int i = 0;
+  for (; i + 8 <= n; i += 8)
+  {
+    for (int l = 0; l < 8; ++l)
+    {
+      low[l] = a[i + l] < low[l] ? a[i + l] : low[l];
+      high[l] = a[i + l] > high[l] ? a[i + l] : high[l];
+    }
+  }
+  for (; i < n; ++i)
+  {
+    low[0] = a[i] < low[0] ? a[i] : low[0];
+    high[0] = a[i] > high[0] ? a[i] : high[0];
+  }
+  for (int l = 0; l < 8; ++l)
+  {
+    least = low[l] < least ? low[l] : least;
+    most = high[l] > most ? high[l] : most;
+  }
+}
+
 /** The sum of a, or of a b where b is given. */
 template <class T>
 LIGHTTRANSPORT_INLINE double totalOf(int n, const T* a, const double* b)
@@ -1436,13 +1492,16 @@ void DiffusionSolver::RightHandSide<T>::row(std::int64_t o, int n, double* to) c
 }
 
 template <class T>
-double DiffusionSolver::norm(const RightHandSide<T>& b) const
+void DiffusionSolver::measure(RightHandSide<T>& b) const
 {
-  return std::sqrt(SumEachRow(this->A, this->parallelFor,
-    [&](std::int64_t, std::int64_t o, int n)
+  const bool plain = b.q && !b.previous;
+  std::vector<std::uint8_t> signs(static_cast<std::size_t>(plain ? this->rows() : 0), 0);
+  b.norm = std::sqrt(SumEachRow(this->A, this->parallelFor,
+    [&](std::int64_t row, std::int64_t o, int n)
     {
-      if (b.q && !b.previous)
+      if (plain)
       {
+        signs[static_cast<std::size_t>(row)] = signsOf(n, b.q + o); // while it is in the cache
         return squaresRow(n, b.q + o, b.qScale, b.mean);
       }
       static thread_local std::vector<double> store;
@@ -1450,6 +1509,12 @@ double DiffusionSolver::norm(const RightHandSide<T>& b) const
       b.row(o, n, store.data());
       return subtract(n, store.data(), store.data() + n, 1., nullptr);
     }));
+  int any = 0;
+  for (const std::uint8_t one : signs)
+  {
+    any |= one;
+  }
+  b.sign = b.mean != 0. ? 0 : any == 1 ? 1 : any == 2 ? -1 : 0;
 }
 
 /**
@@ -1734,7 +1799,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
 {
   const double began = now();
   const std::int64_t size = this->box.size();
-  const double bNorm = this->norm(b);
+  const double bNorm = b.norm;
   const auto darken = [&]
   {
     ForRows(this->parallelFor.whole(), size, size,
@@ -1773,7 +1838,7 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   }
   report.residual = rNorm / bNorm;
   const bool named = control.targetError > 0. || control.timeBudget > 0.;
-  const int sign = named ? this->signOf(b) : 0;
+  const int sign = named ? b.sign : 0;
   if (rNorm <= goal && !named) // else the first cycle tells the error
   {
     report.reason = StopReason::Converged;
@@ -2129,7 +2194,7 @@ void DiffusionSolver::solveConstant(
   const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
 {
   const std::int64_t size = this->box.size();
-  const double bNorm = this->norm(b);
+  const double bNorm = b.norm;
   if (bNorm == 0.)
   {
     ForRows(this->parallelFor.whole(), size, size,
@@ -2512,11 +2577,8 @@ template <class T>
 DiffusionReport DiffusionSolver::solveSteady(
   const T* q, double* phi, const DiffusionControl& control)
 {
-  return this->interruptible(control.progress,
-    [&](DiffusionReport& report)
-    {
-      this->steady(q, phi, control, report);
-    });
+  return this->interruptible(
+    control.progress, [&](DiffusionReport& report) { this->steady(q, phi, control, report); });
 }
 
 template <class T>
@@ -2562,6 +2624,7 @@ void DiffusionSolver::steady(
       b.mean = b.qScale * this->sumOf([q](std::int64_t i) { return static_cast<double>(q[i]); }) /
         static_cast<double>(size);
     }
+    this->measure(b);
     if (this->isConstant)
     {
       this->solveConstant(b, phi, control, report);
@@ -3052,14 +3115,16 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
   }
   if (this->isConstant && steps > 0)
   {
-    const RightHandSide<T> exact{ q, 1. / this->scale, false };
+    RightHandSide<T> exact{ q, 1. / this->scale, false };
+    this->measure(exact);
     const ConstantMedium::Steps all{ steps, shifted, stages == 2 ? (1. - gamma) / gamma : 0. };
     this->marchConstant(exact, phi, all, control, report);
     this->balance(q, phi, report);
     return;
   }
-  const RightHandSide<T> steady{ q, 1. / this->scale, true };
-  const double qNorm = this->norm(steady);
+  RightHandSide<T> steady{ q, 1. / this->scale, true };
+  this->measure(steady);
+  const double qNorm = steady.norm;
   this->setShift(shifted);
   Buffer<double> previous(size);
   report.reason = StopReason::MaxIterations;
@@ -3079,8 +3144,9 @@ void DiffusionSolver::implicit(const T* q, double* phi, int steps, double cdt,
           previous[i] = ahead == 1. ? phi[i] : previous[i] + ahead * (phi[i] - previous[i]);
         }
       });
-    const RightHandSide<T> b{ q, 1. / this->scale, true, 0., previous.data(), this->A.s.data(),
+    RightHandSide<T> b{ q, 1. / this->scale, true, 0., previous.data(), this->A.s.data(),
       this->sinkWithoutShift.data() };
+    this->measure(b);
     const double part = 1. / static_cast<double>(solves);
     try
     {
@@ -3166,7 +3232,7 @@ void DiffusionSolver::marchConstant(const RightHandSide<T>& b, double* phi,
 {
   Showing show(control);
   this->parallelFor.tell(0.);
-  const double bNorm = this->norm(b);
+  const double bNorm = b.norm;
   const double goal = control.tolerance * bNorm;
   const bool dark = this->isZero(phi);
   double rNorm = dark || !std::isfinite(bNorm) ? bNorm : this->residual<T>(b, phi, nullptr, 1.);
@@ -3269,33 +3335,6 @@ void DiffusionSolver::marchConstant(const RightHandSide<T>& b, double* phi,
 
 //------------------------------------------------------------------------------
 template <class T>
-int DiffusionSolver::signOf(const RightHandSide<T>& b) const
-{
-  if (b.mean != 0. || !b.q)
-  {
-    return 0;
-  }
-  const std::int64_t all = this->rows();
-  std::vector<std::uint8_t> signs(static_cast<std::size_t>(all), 0); // 1: above 0, 2: below
-  ForEachRow(this->A, this->parallelFor,
-    [&](std::int64_t row, std::int64_t o, int n)
-    {
-      std::uint8_t one = 0;
-      for (std::int64_t i = o; i < o + n; ++i)
-      {
-        one = static_cast<std::uint8_t>(one | (b.q[i] > T(0) ? 1 : 0) | (b.q[i] < T(0) ? 2 : 0));
-      }
-      signs[static_cast<std::size_t>(row)] = one;
-    });
-  int any = 0;
-  for (const std::uint8_t one : signs)
-  {
-    any |= one;
-  }
-  return any == 1 ? 1 : any == 2 ? -1 : 0;
-}
-
-template <class T>
 void DiffusionSolver::keepSign(
   const RightHandSide<T>& b, double* phi, const DiffusionControl& control, DiffusionReport& report)
 {
@@ -3304,7 +3343,7 @@ void DiffusionSolver::keepSign(
   {
     return;
   }
-  const int sign = this->signOf(b);
+  const int sign = b.sign;
   for (int again = 0; sign != 0; ++again)
   {
     struct Signs
@@ -3316,11 +3355,7 @@ void DiffusionSolver::keepSign(
       [&](std::int64_t row, std::int64_t o, int n)
       {
         Signs& signs = rowSigns[static_cast<std::size_t>(row)];
-        for (std::int64_t i = o; i < o + n; ++i)
-        {
-          signs.least = std::min(signs.least, phi[i]);
-          signs.most = std::max(signs.most, phi[i]);
-        }
+        extremes(n, phi + o, signs.least, signs.most);
       });
     Signs all;
     for (const Signs& signs : rowSigns)
@@ -3346,7 +3381,7 @@ void DiffusionSolver::keepSign(
     if (report.reason != StopReason::Converged || control.targetError > 0. || again == 3)
     {
       // The best answer so far, or (0 is nearer to the exact one) all that a named error asks for.
-      report.residual = this->residual<T>(b, phi, nullptr, 1.) / this->norm(b);
+      report.residual = this->residual<T>(b, phi, nullptr, 1.) / b.norm;
       report.fineApplications += 1.;
       if (report.reason == StopReason::Converged && report.residual > control.tolerance &&
         !(control.targetError > 0.))
@@ -3446,8 +3481,9 @@ DiffusionReport DiffusionSolver::march(const T* q, SteppedField field, int steps
       const int nx = this->box.dims[0];
       this->storeFaces();
       this->setShift(0.);
-      const RightHandSide<T> b{ q, 1. / this->scale, true };
-      const double qNorm = this->norm(b);
+      RightHandSide<T> b{ q, 1. / this->scale, true };
+      this->measure(b);
+      const double qNorm = b.norm;
       other.allocate(size);
       fields[1] = other.data();
       Touch(field.values, size, this->parallelFor);

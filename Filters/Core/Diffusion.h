@@ -337,6 +337,8 @@ private:
     const double* previous = nullptr;
     const float* shifted = nullptr;
     const float* unshifted = nullptr;
+    double norm = 0.; ///< set by measure, as is
+    int sign = 0;     ///< 1 or -1 where all sources are of that sign, and so is the exact answer
 
     /** b of n voxels from o on. */
     void row(std::int64_t o, int n, double* to) const;
@@ -354,11 +356,9 @@ private:
   template <class T>
   void marchConstant(const RightHandSide<T>& b, double* phi, const ConstantMedium::Steps& steps,
     const DiffusionControl& control, DiffusionReport& report);
-  /** 1 or -1 where all sources are of that sign, and so is the exact answer; else 0. */
-  template <class T>
-  int signOf(const RightHandSide<T>& b) const;
   /**
-   * Where all sources are of one sign, so is the exact answer: what is of the other one beyond
+   * Where all sources are of one sign, so is the exact answer, but conjugate gradients undershoot:
+   * a look at phi tells (of sources of both signs there is none). What is of the other one beyond
    * the tolerance or 1e-7 (of the largest |phi|) becomes 0, and the solve goes on from there,
    * where it was not at its end or for a named error: then the residual is told again.
    */
@@ -375,8 +375,9 @@ private:
   template <class T>
   void applyExactly(const DiffusionMedium<T>& medium, const double* phi, std::int64_t row,
     std::int64_t o, int n, double* y) const;
+  /** Its norm, and q's sign, in one pass. */
   template <class T>
-  double norm(const RightHandSide<T>& b) const;
+  void measure(RightHandSide<T>& b) const;
   bool isZero(const double* phi) const;
   /** The mask of what the solver works on; null for none. */
   const std::uint8_t* outsideOfDomain() const;
