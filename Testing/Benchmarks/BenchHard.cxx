@@ -5,10 +5,13 @@
  * stalls, and the multigrid alone, in turn.
  *
  *   bench-hard [--data FOLDER] [--only NAME] [--repeat 3] [--threads 2] [--tolerance 1e-6]
+ *     [--asked N]
  *
  * Prints a table of Markdown: medians of the repeats, set-up included, and the quotient's; at most
  * 500 iterations. "layers" are 300 random layered media of contrast 1e4 to 1e10, with holes and
- * voxels that are not cubes, at 1e-6 and 1e-8. --data has thorax_ct.vti; without, no aorta.
+ * voxels that are not cubes, at 1e-6 and 1e-8. --asked: instead, the longest time that the solve of
+ * a labyrinth of N^3 voxels, aggregation's set-up and all, goes without asking its progress.
+ * --data has thorax_ct.vti; without, no aorta.
  */
 #include "FrugalScenes.h"
 
@@ -168,6 +171,40 @@ void CompareLayers(double tolerance, const ParallelFor& loop)
     seconds[1] / seconds[0]);
   std::fflush(stdout);
 }
+void LongestUnasked(int n, double tolerance, const ParallelFor& loop)
+{
+  const Scene scene = Labyrinth(n, 1, 1e-6f, 1e-4f);
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point last = Clock::now();
+  const Clock::time_point began = last;
+  double longest = 0.;
+  double at = 0.;
+  const auto ask = [&](double)
+  {
+    const Clock::time_point here = Clock::now();
+    const double passed = std::chrono::duration<double>(here - last).count();
+    if (passed > longest)
+    {
+      longest = passed;
+      at = std::chrono::duration<double>(here - began).count();
+    }
+    last = here;
+    return true;
+  };
+  std::vector<double> phi(scene.q.size(), 0.);
+  DiffusionControl control;
+  control.tolerance = tolerance;
+  control.maxIterations = 30;
+  control.progress = ask;
+  DiffusionSolver solver(loop);
+  solver.setMedium(scene.medium(), ask);
+  const DiffusionReport report = solver.solveSteady(scene.q.data(), phi.data(), control);
+  ask(1.);
+  std::printf("labyrinth of 1, walls 1e-6, %d³: %.1f s, %d iterations, %s, residual %.1e; longest "
+              "time unasked %.0f ms, at %.1f s\n",
+    n, std::chrono::duration<double>(Clock::now() - began).count(), report.iterations,
+    ToString(report.reason), report.residual, 1e3 * longest, at);
+}
 } // namespace
 
 int main(int argc, char* argv[])
@@ -175,6 +212,7 @@ int main(int argc, char* argv[])
   std::string data, only;
   int repeat = 3;
   int threads = 2;
+  int asked = 0;
   double tolerance = 1e-6;
   for (int i = 1; i + 1 < argc; i += 2)
   {
@@ -184,10 +222,16 @@ int main(int argc, char* argv[])
     only = option == "--only" ? value : only;
     repeat = option == "--repeat" ? std::max(1, std::atoi(value)) : repeat;
     threads = option == "--threads" ? std::max(1, std::atoi(value)) : threads;
+    asked = option == "--asked" ? std::atoi(value) : asked;
     tolerance = option == "--tolerance" ? std::atof(value) : tolerance;
   }
   vtkSMPTools::Initialize(threads);
   const ParallelFor loop = vtkLightTransportParallelFor();
+  if (asked > 0)
+  {
+    LongestUnasked(asked, tolerance, loop);
+    return 0;
+  }
   const auto wanted = [&](const std::string& name) { return name.find(only) != std::string::npos; };
   std::printf(
     "| scene | tolerance | iterations | s | bytes per voxel | multigrid alone: iterations "
