@@ -2594,6 +2594,7 @@ void DiffusionSolver::steady(
     this->steadyStateExists(q, singular, reached, closed, report))
   {
     const std::int64_t size = this->box.size();
+    std::atomic<bool> changed{ false };
     const auto darken = [&]
     {
       const std::int64_t flags = static_cast<std::int64_t>(reached.size());
@@ -2602,7 +2603,11 @@ void DiffusionSolver::steady(
         {
           for (std::int64_t i = begin; i < end; ++i)
           {
-            phi[i] = reached[static_cast<std::size_t>(i)] ? phi[i] : 0.;
+            if (!reached[static_cast<std::size_t>(i)] && phi[i] != 0.)
+            {
+              phi[i] = 0.;
+              changed = true;
+            }
           }
         });
     };
@@ -2654,6 +2659,7 @@ void DiffusionSolver::steady(
       restore();
     }
     this->keepSign(b, phi, control, report);
+    changed = !closed.empty();
     for (const ClosedPart& part : closed)
     {
       double sum = 0.;
@@ -2667,6 +2673,12 @@ void DiffusionSolver::steady(
       }
     }
     darken(); // a closed part without sink may hold any constant: it holds none
+    if (changed && report.reason != StopReason::Cancelled && report.reason != StopReason::NotFinite)
+    {
+      // what such a part had left is gone
+      report.residual = this->residual<T>(b, phi, nullptr, 1.) / (b.norm > 0. ? b.norm : 1.);
+      report.fineApplications += 1.;
+    }
     if (singular)
     {
       const double mean =
