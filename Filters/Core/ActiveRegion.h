@@ -15,7 +15,10 @@
  *      ahead phi is lower than it would be without it, by 1 - e^-2c in matter that goes on.
  *   3. The region has come to its end when the front has nowhere to go.
  *
- * The arrays take 5 bytes per voxel where the front was, and nothing elsewhere.
+ * The arrays take 5 bytes per voxel where the front was, and nothing elsewhere. Rows, cut at whole
+ * pairs, and not the tiles of an OpenVDB tree: where light stays in a tube, tiles of 8^3 hold three
+ * times as many voxels, and a tree's topology takes longer to grow than all of the solve
+ * (bench-diffusion --sections region).
  */
 #ifndef LightTransport_Core_ActiveRegion_h
 #define LightTransport_Core_ActiveRegion_h

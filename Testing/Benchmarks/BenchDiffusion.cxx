@@ -29,12 +29,12 @@
 #include "DiffusionCompetitors.h"
 #include "DiffusionSweeps.h"
 
+#include "Core/Watched.h"
 #include "vtkLightTransportInternal.h"
 
 #include "vtkSMPTools.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -85,11 +85,6 @@ struct Options
 };
 
 const MediumRecipe Recipes[] = { { 1e4, .99 }, { 1e6, .999 } };
-
-double now()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 /** To standard error, with the seconds since the start. */
 void say(const Options& options, const std::string& what)

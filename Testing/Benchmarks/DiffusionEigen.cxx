@@ -2,23 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "DiffusionCompetitors.h"
 
+#include "Core/Watched.h"
+
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCore>
-
-#include <chrono>
 
 namespace lighttransport
 {
 namespace benchmark
 {
-namespace
-{
-double now()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-} // namespace
-
 Run SolveEigen(const Problem& problem, double tolerance, std::vector<double>& phi)
 {
   Run run;

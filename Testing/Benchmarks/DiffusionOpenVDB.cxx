@@ -2,26 +2,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "DiffusionCompetitors.h"
 
+#include "Core/Watched.h"
+
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/PoissonSolver.h>
 #include <tbb/global_control.h>
 
-#include <chrono>
-
 namespace lighttransport
 {
 namespace benchmark
 {
-namespace
-{
-double now()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-} // namespace
-
 Run SolveOpenVDB(const Problem& problem, double tolerance, int threads, std::vector<double>& phi)
 {
   Run run;
