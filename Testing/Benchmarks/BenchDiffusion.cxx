@@ -1048,7 +1048,9 @@ bool MeasureSolves(const Options& options, double triad)
     "\n## The steady solve, relative residual %.0e\n\n"
     "s: set-up + solve (hypre's and Eigen's filling of the matrix, OpenVDB's of the tree are not "
     "in it; D to phi for this solver), in memory that is fresh from the system; again: the same in "
-    "a heap that a solve before it has left; medians of so many repeats. Residual: "
+    "a heap that a solve before it has left; medians of so many repeats. Before each solve, "
+    "whoever's, 200 bytes per voxel are written to and given back, so that a virtual machine has "
+    "them from its host: see below for what that took. Residual: "
     "|q - A phi| / |q| in double by the same function for all (OpenVDB stops by the maximum norm, "
     "the others by this one). Bytes beyond the input, phi included: as the solver tells (hypre: "
     "resident). Errors as above. Not run: what would take more than %.0f s or --limit, or more "
@@ -1060,6 +1062,7 @@ bool MeasureSolves(const Options& options, double triad)
     options.tolerance, Patience);
   Summary summary;
   std::map<std::string, Cost> costs;
+  std::map<int, std::vector<double>> lent; // by size: seconds per GB until the machine has it
   bool kept = true;
   const int threads = options.most();
   const ParallelFor parallelFor = OnThreads(threads);
@@ -1149,6 +1152,10 @@ bool MeasureSolves(const Options& options, double triad)
             entry.repeat = i;
             continue;
           }
+          const std::size_t touched = static_cast<std::size_t>(
+            std::min(200. * voxels, available > 0. ? 0.5 * available : 0.));
+          lent[n].push_back(
+            1e9 * TouchSeconds(touched, TouchedPages::Large, parallelFor).first / touched);
           const double cpuBegan = CpuSeconds();
           const double began = now();
           Run run = entry.solve(phi, i == 0);
@@ -1232,6 +1239,14 @@ bool MeasureSolves(const Options& options, double triad)
           summaryCsv, summary);
       }
     }
+  }
+  std::printf(
+    "\nSeconds that the machine took to have a GB ready, before a solve: median, most.\n\n"
+    "| size | median | most |\n|---|---|---|\n");
+  for (const auto& one : lent)
+  {
+    std::printf("| %d³ | %.3f | %.3f |\n", one.first, median(one.second),
+      *std::max_element(one.second.begin(), one.second.end()));
   }
   std::printf("\n### lighttransport beside hypre's PCG+PFMG\n\n"
               "hypre on its best number of ranks up to these threads; times faster: the median of "
