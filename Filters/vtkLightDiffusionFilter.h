@@ -32,9 +32,9 @@
  *      medium changes;
  *   3. solve: Steady by conjugate gradients with one multigrid cycle as
  *      preconditioner (of aggregates where that stalls; a constant medium directly), until
- *      the residual, recomputed in double precision, is below the tolerance; or time steps,
- * Explicit (forward Euler) or Implicit (backward Euler or SDIRK2, both L-stable), from phi = 0 or
- * from the last state;
+ *      the residual, recomputed in double precision, is below the tolerance; or time
+ *      steps, Explicit (forward Euler) or Implicit (backward Euler or SDIRK2, both
+ *      L-stable), from phi = 0 or from the last state;
  *   4. write the arrays, and the report into getters and field data
  *      (`LightDiffusionReport.*`), so that a saved file says how it was made.
  *
