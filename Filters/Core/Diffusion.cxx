@@ -2161,6 +2161,18 @@ void DiffusionSolver::conjugateGradients(const RightHandSide<T>& b, double* phi,
   }
 }
 
+void DiffusionSolver::add(double sign, const double* x, double* phi) const
+{
+  ForEachRow(this->A, this->parallelFor.whole(),
+    [&](std::int64_t, std::int64_t o, int n)
+    {
+      for (std::int64_t i = o; i < o + n; ++i)
+      {
+        phi[i] += sign * x[i];
+      }
+    });
+}
+
 template <class T>
 void DiffusionSolver::residualOfConstant(
   const RightHandSide<T>& b, const double* phi, double* x) const
@@ -2259,18 +2271,7 @@ void DiffusionSolver::solveConstant(
       }
     }
     // 3. phi += x, where that is better
-    const auto add = [&](double sign)
-    {
-      ForEachRow(this->A, this->parallelFor.whole(),
-        [&](std::int64_t, std::int64_t o, int n)
-        {
-          for (std::int64_t i = o; i < o + n; ++i)
-          {
-            phi[i] += sign * x[i];
-          }
-        });
-    };
-    add(1.);
+    this->add(1., x.data(), phi);
     const double last = rNorm;
     rNorm = this->residual<T>(b, phi, nullptr, 1.);
     report.fineApplications += 1.;
@@ -2285,7 +2286,7 @@ void DiffusionSolver::solveConstant(
     {
       if (rNorm > last)
       {
-        add(-1.);
+        this->add(-1., x.data(), phi);
         rNorm = last;
       }
       report.residual = rNorm / bNorm;
@@ -3298,18 +3299,7 @@ void DiffusionSolver::marchConstant(const RightHandSide<T>& b, double* phi,
       rest);
     Touch(phi, this->box.size(), this->parallelFor);
     // 2. phi += x
-    const auto add = [&](double sign)
-    {
-      ForEachRow(this->A, this->parallelFor.whole(),
-        [&](std::int64_t, std::int64_t o, int n)
-        {
-          for (std::int64_t i = o; i < o + n; ++i)
-          {
-            phi[i] += sign * x[i];
-          }
-        });
-    };
-    add(1.);
+    this->add(1., x.data(), phi);
     const double last = rNorm;
     rNorm = this->residual<T>(b, phi, nullptr, 1.);
     report.fineApplications += 1.;
@@ -3335,7 +3325,7 @@ void DiffusionSolver::marchConstant(const RightHandSide<T>& b, double* phi,
     {
       if (rNorm > last)
       {
-        add(-1.);
+        this->add(-1., x.data(), phi);
         rNorm = last;
       }
       stop(StopReason::Breakdown, "the tolerance is below what double precision reaches here");

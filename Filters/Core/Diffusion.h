@@ -349,6 +349,8 @@ private:
   template <class T>
   void solveConstant(const RightHandSide<T>& b, double* phi, const DiffusionControl& control,
     DiffusionReport& report);
+  /** phi += sign x; not interrupted: phi stays a whole. */
+  void add(double sign, const double* x, double* phi) const;
   /** x = b - A phi from the medium itself. */
   template <class T>
   void residualOfConstant(const RightHandSide<T>& b, const double* phi, double* x) const;
